@@ -53,8 +53,7 @@ impl Default for ExpectedSettings {
 /// would stay there.
 const FIRST: [f64; 2] = [0.3, 0.02];
 
-/// Largest half step of a start coordinate, in standard deviations of its range: a fit over more is
-/// no longer local.
+/// Largest half step of a start coordinate, in standard deviations of its range.
 const START_REACH: f64 = 0.5;
 
 /// Expected posterior standard deviation of each unknown after each control step of an episode.

@@ -1,14 +1,14 @@
-//! How two tracked parts are joined: rigidly, by a hinge or by a slide, and about which
-//! axis, from their tracked poses alone.
+//! How two tracked parts are joined (rigidly, by a hinge or by a slide) and about which axis, from
+//! their tracked poses alone.
 //!
-//! The pose of the moving part in the frame of the fixed one is the same at all times
-//! (rigid), turned about an axis by an angle of its own at each time (revolute), or shifted
-//! along one (prismatic). Each kind is fitted by least squares on the readings,
-//! whitened by what the noise of both trackers makes of the relative pose: the noise of
-//! the fixed part's orientation turns the other part about it, so that position and
-//! rotation go together. Angles and shifts are eliminated for each trial of axis, origin and
-//! mean pose (variable projection; Golub and Pereyra 1973). The kind is chosen by the Bayesian
-//! information criterion, which charges every angle and shift.
+//! The pose of the moving part in the frame of the fixed one is constant (rigid), turned about an
+//! axis by a separate angle at each time (revolute), or shifted along one (prismatic).
+//!
+//! Each kind is fitted by least squares. The residuals are whitened by the noise that both trackers
+//! cause in the relative pose. Orientation noise of the fixed part turns the other part about it,
+//! so the noise of position and rotation is correlated. Angles and shifts are eliminated for each
+//! trial of axis, origin and mean pose (variable projection; Golub and Pereyra 1973). The Bayesian
+//! information criterion chooses the kind; it penalises every angle and shift as a free parameter.
 
 mod fit;
 
@@ -32,7 +32,7 @@ pub enum Joint {
     Prismatic,
 }
 
-/// Standard deviations of a tracker.
+/// Standard deviations of a tracker's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Of each entry of a position, m.
@@ -52,19 +52,19 @@ pub struct Articulation {
     pub axis: Option<[f64; 3]>,
     /// Standard deviation of the axis, rad.
     pub axis_std: Option<f64>,
-    /// Point of the axis nearest to the moving part, in the fixed part's frame, m; `None`
-    /// but for a revolute joint.
+    /// Point of the axis nearest to the moving part, in the fixed part's frame, m; `None` unless
+    /// the joint is revolute.
     pub origin: Option<[f64; 3]>,
     /// Standard deviation of the origin across the axis, m.
     pub origin_std: Option<f64>,
-    /// How far the joint moved: largest less smallest angle (rad) or shift (m).
+    /// Travel of the joint: largest minus smallest angle (rad) or shift (m).
     pub travel: f64,
     /// Root mean square of the whitened residual.
     pub residual: f64,
 }
 
-/// How the two parts that a task tracks are joined, from all readings of the episodes; `None`
-/// where it tracks no two parts.
+/// Joint between the two parts that a task tracks, from all readings of the episodes; `None` where
+/// the task does not track two parts.
 ///
 /// # Errors
 /// When the task names sensors that are not tracked, or no row has both poses.
@@ -106,7 +106,7 @@ pub fn of_episodes(
     estimate(&poses, [noises[0], noises[1]]).map(Some)
 }
 
-/// `world_from_part` of a position and an orientation.
+/// Pose of a part in the world (`world_from_part`) from its position and orientation.
 fn pose(row: &[f64]) -> Isometry3<f64> {
     Isometry3::from_parts(
         Vector3::new(row[0], row[1], row[2]).into(),
@@ -114,11 +114,11 @@ fn pose(row: &[f64]) -> Isometry3<f64> {
     )
 }
 
-/// How the second part is joined to the first, from their poses in the world and the noise
-/// of each part's tracker.
+/// Joint between the second part and the first, from their poses in the world and the noise of each
+/// part's tracker.
 ///
 /// # Errors
-/// When there are too few poses to tell.
+/// When there are fewer than 3 poses.
 pub fn estimate(poses: &[[Isometry3<f64>; 2]], noise: [Noise; 2]) -> Result<Articulation> {
     if poses.len() < 3 {
         return Err(Error::Failed(format!(
@@ -213,7 +213,7 @@ mod tests {
         let axis = Vector3::new(-1.0, 0.2, 0.1).normalize();
         let origin = Vector3::new(0.0, 0.1, 0.03);
         for seed in 0..5 {
-            // It stands still at first, as a lid before it is touched.
+            // The joint stands still at first, like a lid before it is touched.
             let found = estimate(
                 &tracked(seed, |t| {
                     let angle = (2.0 * t - 1.0).max(0.0) * 0.6;
@@ -232,7 +232,7 @@ mod tests {
             let off = (Vector3::from(found.origin.unwrap()) - origin)
                 .cross(&axis)
                 .norm();
-            // The deviations that it gives itself hold (4 of them), and are those of the noise.
+            // The errors lie within 4 of the stated standard deviations, which match the noise.
             let (tilt_std, off_std) = (found.axis_std.unwrap(), found.origin_std.unwrap());
             assert!(
                 tilt < 4.0 * tilt_std && tilt_std < 0.02,

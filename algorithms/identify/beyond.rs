@@ -1,27 +1,29 @@
-//! Past the end of a prior.
+//! Search beyond the ends of a prior's range.
 //!
-//! A prior's range is where the unknown is expected, and seldom where physics ends. Where a posterior piles
-//! up at an end of it, prior and data contradict each other (Evans and Moshonov 2006, "Checking for
-//! prior-data conflict"): the best value inside is then an artefact of the range. So the range is widened
-//! at that end and the episodes are identified anew, until the posterior lies inside or the limit is reached.
-//! The result says from where to where was searched in the end.
+//! A prior's range is where the unknown is expected; it is seldom a physical limit. Where a
+//! posterior piles up at an end of it, prior and data contradict each other (Evans and Moshonov
+//! 2006, "Checking for prior-data conflict"). The best value inside is then an artefact of the
+//! range. So the range is widened at that end and the episodes are identified again, until the
+//! posterior lies inside or the limit is reached. The result states the range that was finally
+//! searched.
 
 use asid_core::identify::Identified;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::posterior::Edge;
 use asid_core::{Error, Problem, Result};
 
-/// Share of the prior's range by which an end is moved at once: a truth that lies just outside is
-/// not looked for far away, where draws would be spent in vain.
+/// Share of the prior's range by which an end moves at once. A truth just outside is then not
+/// searched for far away, where draws would be wasted.
 const STRIDE: f64 = 0.5;
 
-/// Identifies within the prior's ranges and, while the posterior of an unknown piles up at an end, in
-/// ranges that reach further, by at most `most` widths of the prior's range (on its scale).
+/// Identifies within the prior's ranges, and in wider ranges while the posterior of an unknown
+/// piles up at an end.
 ///
-/// A wider search that fails, such as one that no engine can simulate, leaves the answer as it was.
+/// A range grows by at most `most` widths of the prior's range (on its scale). If a wider search
+/// fails, for example because no engine can simulate it, the previous answer stands.
 ///
 /// # Errors
-/// Those of the first `identify`, and [`Error::Interrupted`].
+/// Those of the first call of `identify`, and [`Error::Interrupted`].
 pub fn identify(
     problem: &Problem<'_>,
     most: f64,
@@ -57,13 +59,14 @@ pub fn identify(
     Ok(found)
 }
 
-/// At which end of its range each unknown piles up.
+/// The end of its range at which each unknown's posterior piles up, if any.
 fn piles(found: &Identified) -> Vec<Option<Edge>> {
     let marginals = &found.posterior.marginals;
     marginals.iter().map(|m| m.at_edge).collect()
 }
 
-/// The later answer, with the whole course of the search, and with what was searched beyond the prior.
+/// The later answer with the iterations of both searches; widened unknowns keep their edge and
+/// state the searched range.
 fn merged(
     before: Identified,
     mut after: Identified,
@@ -86,9 +89,11 @@ fn merged(
     }
 }
 
-/// Moves an end of a range outwards by a share of the prior's width, on its scale. A range of one sign keeps
-/// it, for masses, frictions and times have no other: its end moves half of the way to zero instead. False
-/// where the end is zero, and can move nowhere.
+/// Moves an end of a range outwards by a share of the prior's width, on its scale; returns whether
+/// it moved.
+///
+/// A range of one sign keeps its sign, since masses, frictions and times have no other: where the
+/// end would cross zero, it moves half of the way to zero instead. An end at zero cannot move.
 fn move_end(wide: &mut Parameter, prior: &Parameter, end: Edge, share: f64) -> bool {
     let (at, side) = match end {
         Edge::Low => (0, -1.0),

@@ -15,26 +15,26 @@ use crate::optimise::CmaEsSettings;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsIdentifier {
-    /// Refits of the search.
+    /// Refits of the search distribution.
     pub iterations: usize,
-    /// Simulations a refit.
+    /// Simulations per refit.
     pub population: usize,
-    /// Searches anew at most, each of twice the population of the one before, while readings are missed by more than
-    /// noise and a model's usual errors explain.
+    /// Maximum number of restarts, each with twice the population of the one before. The search
+    /// restarts while the residuals exceed what noise and a model's usual errors explain.
     pub restarts: usize,
     /// Search distribution.
     pub cma_es: CmaEsSettings,
-    /// Deviations of the trackers' systematic errors, which are integrated out.
+    /// Standard deviations of the trackers' systematic errors, which are integrated out.
     pub tracker: TrackerPrior,
-    /// Posterior after the search.
+    /// How the posterior is sampled after the search.
     pub sampling: SamplingSettings,
 }
 
 impl Default for CmaEsIdentifier {
     fn default() -> Self {
         Self {
-            // As many simulations as the other searches, in more and smaller refits: its covariance
-            // is learned over refits, where theirs is that of one.
+            // As many simulations as the other searches, in more and smaller refits: CMA-ES learns
+            // its covariance over many refits, the others from one.
             iterations: 16,
             population: 20,
             restarts: 1,

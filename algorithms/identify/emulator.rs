@@ -1,23 +1,22 @@
-//! A smooth local model of a rough simulator, and the posterior under it.
+//! A smooth local model (emulator) of a rough simulator, and the posterior under it.
 //!
-//! With contact, the trajectory is not a smooth function of the unknowns: a
-//! contact made a step earlier sends it a few millimetres elsewhere. Two nearby
-//! points then differ by many times the sensors' noise, and the likelihood of
-//! single simulations says more about their luck than about the unknowns. The real
-//! machine has luck of its own.
+//! With contact, the trajectory is not a smooth function of the unknowns: a contact one step
+//! earlier shifts it by a few millimetres. Two nearby points then differ by many times the sensors'
+//! noise. The likelihood of a single simulation depends more on this random scatter than on the
+//! unknowns, and the real machine scatters too.
 //!
-//! So the residuals `e(x)` of points spread over a region are regressed on
-//! quadratic features, `e(x) = A phi(x) + epsilon`. The regression averages the
-//! luck away, and its residuals measure it: an observation differs from `A phi`
-//! by the sensors' noise (whitened: `1`) and one more draw of `epsilon`, with
-//! variance `s_k^2` at reading `k` and correlated along the episode. With weights
-//! `W = 1 / (1 + s^2)` the loss is `phi^T A^T W A phi / 2`. Its width ignores the
-//! correlation; the sandwich formula (White 1982)
+//! So the residuals `e(x)` of points spread over a region are regressed on quadratic features,
+//! `e(x) = A phi(x) + epsilon`. The regression averages the scatter out, and its residuals measure
+//! it. An observation differs from `A phi` by the sensors' noise (whitened: `1`) and one more draw
+//! of `epsilon`, which has variance `s_k^2` at reading `k` and is correlated along the episode.
+//!
+//! With weights `W = 1 / (1 + s^2)` the loss is `phi^T A^T W A phi / 2`. The width of its minimum
+//! ignores the correlation. The sandwich formula (White 1982) includes it:
 //!
 //! `H^-1 B^T W (1 + R) W B H^-1`, `H = B^T W B`, `B = de/dx`, `R = cov(epsilon)`
 //!
-//! does not, and the loss is multiplied by the ratio of the two (a temperature).
-//! Nothing here selects points by how well they fit, which would bias it.
+//! The loss is divided by the ratio of the sandwich variance to the naive one (a temperature).
+//! Points are never selected by how well they fit, which would bias the result.
 
 use crate::fisher::precision::{Precision, inflation};
 use asid_core::rng::Rng;
@@ -29,7 +28,8 @@ use crate::optimise::Gaussian;
 /// Ridge on the regression, relative to the number of points.
 const RIDGE: f64 = 1e-6;
 
-/// The posterior is looked for within this many deviations of the region's middle.
+/// The posterior is sought within this many standard deviations of the region's middle, where there
+/// are points to fit.
 pub const REACH: f64 = 3.0;
 
 /// A quadratic model of the residuals over a region.
@@ -37,7 +37,7 @@ pub struct Emulator {
     region: Gaussian,
     /// `A^T W A`, features x features.
     gram: DMatrix<f64>,
-    /// Factor on the loss.
+    /// Factor on the loss: the inverse of variance inflation times mismatch.
     temperature: f64,
     /// Root mean square of the emulated whitened residual at its best point.
     pub residual: f64,
@@ -51,7 +51,7 @@ pub fn features_len(n: usize) -> usize {
     1 + n + n * (n + 1) / 2
 }
 
-/// `1, u, u u^T` (upper triangle).
+/// Quadratic features `1, u, u u^T` (upper triangle). Derivative of the features, `d phi / d u_k`.
 fn features(u: &[f64]) -> Vec<f64> {
     let mut phi = Vec::with_capacity(features_len(u.len()));
     phi.push(1.0);
@@ -79,10 +79,11 @@ fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
 }
 
 impl Emulator {
-    /// Fits residuals of points in a region; `sought` is how many leading entries are
-    /// unknowns (the others are start poses). `readings` is how many residual entries
-    /// are present. Readings are weighed by their roughness alone or, if `correlated`, also by how it
-    /// runs along the episode. `None` where there are too few points.
+    /// Fits the residuals of points in a region; `None` where there are too few points.
+    ///
+    /// The first `sought` entries are unknowns, the others start poses. `readings` is the number of
+    /// residual entries that are present. Readings are weighted by the variance of their roughness
+    /// or, if `correlated`, by its whole covariance along the episode.
     #[must_use]
     pub fn fit(
         region: &Gaussian,
@@ -126,12 +127,12 @@ impl Emulator {
         };
         let best = emulator.minimum(n);
         let best_features = DVector::from_vec(features(&best));
-        // Residual at the best point, in units of what noise and roughness explain.
+        // Residual at the best point in units of the noise; the mismatch also counts the roughness.
         let at_best = a.transpose() * &best_features;
         let raw = at_best.norm_squared() / readings.max(1) as f64;
         emulator.residual = raw.sqrt();
         let mismatch = 2.0 * emulator.loss_at(&best) / (readings as f64 - n as f64).max(1.0);
-        // Slopes of the residuals at the best point, and the two covariances.
+        // Slopes of the residuals at the best point, for the ratio of the two covariances.
         let b = DMatrix::from_fn(m, n, {
             let slopes: Vec<DVector<f64>> = (0..n)
                 .map(|k| a.transpose() * DVector::from_vec(feature_slope(&best, k)))
@@ -139,8 +140,8 @@ impl Emulator {
             move |i, k| slopes[k][i]
         });
         let inflation = if correlated {
-            // A covariance says nothing of the luck that it was made of: each half is asked of
-            // the other.
+            // A sample covariance cannot be tested on the points that it was computed from: each
+            // half is evaluated with the covariance of the other.
             let share = freedom / count as f64;
             let half = |k: usize| {
                 let rows: Vec<usize> = (k..count).step_by(2).collect();
@@ -170,7 +171,7 @@ impl Emulator {
         self.temperature * self.loss_at(&self.region.standardise(x))
     }
 
-    /// The best point in standardised coordinates, within reach: damped Newton steps.
+    /// The best point within reach, in standardised coordinates, by damped Newton steps.
     fn minimum(&self, n: usize) -> Vec<f64> {
         let mut u = vec![0.0; n];
         let mut loss = self.loss_at(&u);
@@ -211,8 +212,9 @@ impl Emulator {
             .unstandardise(&self.minimum(self.region.mean().len()))
     }
 
-    /// `count` equally weighted points of the posterior, by a Metropolis walk inside the
-    /// box and within reach of the region's middle.
+    /// Draws `count` equally weighted points of the posterior by a Metropolis walk.
+    ///
+    /// The walk stays inside the box and within reach of the region's middle.
     pub fn sample(&self, low: &[f64], high: &[f64], count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = self.region.mean().len();
         let inside = |u: &[f64]| {
@@ -235,7 +237,7 @@ impl Emulator {
                 .collect();
             u = self.region.standardise(&x);
         }
-        // Steps shaped by the curvature at the best point, scaled for the walk's acceptance.
+        // Proposal steps follow the curvature at the best point, scaled for a good acceptance rate.
         let slopes: Vec<DVector<f64>> = (0..n)
             .map(|k| DVector::from_vec(feature_slope(&u, k)))
             .collect();
@@ -265,8 +267,10 @@ mod tests {
     use asid_core::Streams;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// A linear simulator with `m` readings, roughness of size `rough` that lasts `run`
-    /// readings, and a draw of noise.
+    /// Fits one draw of noise from a linear simulator with 200 readings; returns the estimate and
+    /// its standard deviation.
+    ///
+    /// Roughness has size `rough` and lasts `run` readings.
     fn fitted(seed: u64, rough: f64, run: usize, correlated: bool) -> (f64, f64) {
         let mut rng = Streams::new(seed).stream("e");
         let m = 200;
@@ -307,7 +311,8 @@ mod tests {
 
     #[test]
     fn without_roughness_it_is_linear_regression() {
-        // Truth 0, 200 readings of slope 0.5 and noise 1: deviation 1 / (0.5 sqrt 200) = 0.141.
+        // Truth 0, 200 readings of slope 0.5 and noise 1: standard deviation 1 / (0.5 sqrt 200) =
+        // 0.141.
         for correlated in [false, true] {
             let (mean, std) = fitted(1, 0.0, 1, correlated);
             assert!(mean.abs() < 4.0 * 0.141, "{mean}");
@@ -317,9 +322,9 @@ mod tests {
 
     #[test]
     fn intervals_hold_under_correlated_roughness() {
-        // Luck of 3 noise deviations that lasts 20 readings: ten independent pieces, so the
-        // deviation of the estimate is 3 / (0.5 sqrt 10) = 1.9. Were every reading taken for
-        // independent, it would seem to be 0.45.
+        // Roughness of 3 noise standard deviations that lasts 20 readings: ten independent pieces,
+        // so the estimate has a standard deviation of 3 / (0.5 sqrt 10) = 1.9. Independent readings
+        // would give 0.45.
         for correlated in [false, true] {
             let runs: Vec<(f64, f64)> = (0..60).map(|s| fitted(s, 3.0, 20, correlated)).collect();
             let covered = runs.iter().filter(|(m, s)| m.abs() < 1.96 * s).count();
@@ -327,17 +332,18 @@ mod tests {
                 "{correlated} {covered} {}",
                 runs.iter().map(|r| r.1).sum::<f64>() / 60.0
             );
-            // A binomial of 60 at 0.95 is at least 51 with probability 0.998. The box of three region
-            // deviations cuts the widest posteriors.
+            // A binomial of 60 at 0.95 is at least 51 with probability 0.998. The box of three
+            // standard deviations of the region cuts the widest posteriors.
             assert!(covered >= 50, "{covered} of 60");
         }
     }
 
     #[test]
     fn what_takes_no_part_in_the_luck_keeps_its_weight_if_the_correlation_is_known() {
-        // Luck moves even readings up and odd ones down together, the unknown moves all up: the two
-        // have nothing in common, and 200 readings of slope 0.5 tell the unknown to 0.141. Taken alone
-        // each reading has a deviation of sqrt(1 + 9), and tells 0.447 in all.
+        // Roughness moves even readings up and odd ones down together; the unknown moves all up.
+        // The two are orthogonal, so 200 readings of slope 0.5 determine the unknown to 0.141.
+        // Without the correlation each reading has a standard deviation of sqrt(1 + 9), which gives
+        // 0.447.
         let (m, slope, rough) = (200, 0.5, 3.0);
         let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
         let mut rng = Streams::new(3).stream("e");
@@ -367,7 +373,7 @@ mod tests {
             variance.sqrt()
         });
         assert!(alone > 0.4, "{alone}");
-        // A fifth of the roughness is left at each reading: sqrt(1 + 0.2 * 9) * 0.141.
+        // A fifth of the roughness is treated as independent: sqrt(1 + 0.2 * 9) * 0.141.
         assert!(together < 0.27, "{together}");
     }
 

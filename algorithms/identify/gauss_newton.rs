@@ -1,9 +1,10 @@
-//! Identification by Gauss-Newton: damped least squares from several starts of the prior, slopes by
-//! central differences in batches, and a posterior from the normal matrix.
+//! Identification by Gauss-Newton: damped least squares from several starts in the prior, slopes by
+//! batched central differences, and a posterior from the normal matrix.
 //!
-//! What the readings do not see is named. A direction of the unknowns is *unseen* where the readings alone
-//! leave it a deviation of the whole range of the prior (an information below 1/12 in prior deviations,
-//! since the range is the square root of 12 of them wide). Along it the posterior is the prior.
+//! The result names what the readings do not see. A direction of the unknowns is *unseen* where the
+//! readings alone leave it a standard deviation as wide as the prior's range. This is an
+//! information below 1/12 in prior standard deviations, since the range is sqrt(12) of them wide.
+//! Along an unseen direction the posterior is the prior.
 
 use asid_core::identify::{Assumptions, Identified, Identifier, IterationSummary};
 use asid_core::posterior::Direction;
@@ -24,23 +25,24 @@ use crate::optimise::GaussNewtonSettings;
 use crate::optimise::gauss_newton::{Fit, Space, minimise};
 use crate::optimise::require;
 
-/// Information in prior deviations below which a direction is unseen; see the module.
+/// Information, in prior standard deviations, below which a direction is unseen; see the module
+/// documentation.
 const UNSEEN: f64 = 1.0 / 12.0;
 
-/// Share of an unknown below which it is left out of a direction's name.
+/// Smallest weight of an unknown that is listed in the name of a direction.
 const NAMED: f64 = 0.1;
 
 /// Settings of identification by Gauss-Newton.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaussNewtonIdentifier {
-    /// Search and the fits at its end.
+    /// Settings of the search and of the fits at its end.
     pub gauss_newton: GaussNewtonSettings,
-    /// Deviations of the trackers' systematic errors, which are integrated out.
+    /// Standard deviations of the trackers' systematic errors, which are integrated out.
     pub tracker: TrackerPrior,
-    /// Samples of the posterior that are kept.
+    /// Number of posterior samples that are kept.
     pub samples: usize,
-    /// How far the search goes on past an end of a prior's range where the posterior piles up there, in
+    /// How far the search continues past an end of a prior's range where the posterior piles up, in
     /// widths of the range; 0 keeps it inside.
     pub beyond: f64,
 }
@@ -96,7 +98,7 @@ impl Identifier for GaussNewtonIdentifier {
 }
 
 impl GaussNewtonIdentifier {
-    /// Identifies inside the ranges of the problem's unknowns.
+    /// Identifies within the ranges of the problem's unknowns.
     fn within(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
         let starts = problem.task.exploration().start.len() * episodes.len();
         let settings = &self.gauss_newton;
@@ -118,7 +120,7 @@ impl GaussNewtonIdentifier {
         models::average(problem.parameters, found, likelihood.present())
     }
 
-    /// The fit of one model; `None` where nearly every simulation diverged.
+    /// Fits one model; `None` where nearly every simulation diverged.
     fn of_model(
         &self,
         problem: &Problem<'_>,
@@ -133,7 +135,8 @@ impl GaussNewtonIdentifier {
             sought,
             readings: likelihood.present(),
         };
-        // The same draws for every model: where the data tell nothing, so does the comparison.
+        // The same draws for every model, so that models which the data cannot distinguish compare
+        // as equal.
         let mut rng = problem.streams.stream("identify");
         let fit = minimise(
             &self.gauss_newton,
@@ -177,7 +180,8 @@ impl GaussNewtonIdentifier {
     }
 }
 
-/// The posterior of a fit whose leading entries are these parameters in prior deviations, by `count` draws.
+/// The posterior of a fit, as `count` draws; the fit's leading entries are these parameters in
+/// prior standard deviations.
 #[must_use]
 pub fn posterior_of(fit: &Fit, parameters: &[Parameter], count: usize, rng: &mut Rng) -> Posterior {
     let seen = Seen::new(fit, parameters.len());
@@ -191,12 +195,12 @@ pub fn posterior_of(fit: &Fit, parameters: &[Parameter], count: usize, rng: &mut
     Posterior::from_samples(parameters, drawn, &weights).with_unseen(seen.unseen(&names))
 }
 
-/// What the readings see of the unknowns: information by directions.
+/// What the readings determine about the unknowns: information by direction.
 struct Seen {
     middle: DVector<f64>,
     at: Vec<f64>,
     directions: DMatrix<f64>,
-    /// Information along each direction; zero where it is unseen.
+    /// Information along each direction; zero where the direction is unseen.
     information: Vec<f64>,
 }
 
@@ -212,13 +216,13 @@ impl Seen {
         }
     }
 
-    /// The directions that no reading sees, by the names of the unknowns.
+    /// The unseen directions, with the weights of the named unknowns.
     fn unseen(&self, names: &[&str]) -> Vec<Direction> {
         let unseen = (0..self.information.len()).filter(|&k| self.information[k] == 0.0);
         unseen
             .map(|k| {
                 let column = self.directions.column(k);
-                // An axis has no sign: its largest share is positive.
+                // The sign of a direction is arbitrary: the largest weight is made positive.
                 let sign = column[column.iamax()].signum();
                 Direction {
                     weights: names
@@ -232,7 +236,8 @@ impl Seen {
             .collect()
     }
 
-    /// Draws of the posterior: normal as the information has it, and inside the prior's range.
+    /// Draws from the posterior: a normal distribution by the information, cut to the prior's
+    /// range.
     fn sample(&self, count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
         let d = self.at.len();
         let matrix = &self.directions
@@ -278,7 +283,7 @@ mod tests {
 
     #[test]
     fn an_unseen_sum_or_difference_is_named() {
-        // 100 about the sum of two unknowns, nothing about their difference.
+        // Information 100 about the sum of two unknowns, none about their difference.
         let found = seen(&[0.2, 0.1], &[100.0, 100.0, 100.0, 100.0]);
         let unseen = found.unseen(&["a", "b"]);
         assert_eq!(unseen.len(), 1);
@@ -288,7 +293,7 @@ mod tests {
         assert_eq!([a.as_str(), b.as_str()], ["a", "b"]);
         let root = 0.5_f64.sqrt();
         assert!((x.abs() - root).abs() < 1e-9 && (x + y).abs() < 1e-9);
-        // Along it the draws spread over the whole range, across it they do not.
+        // The draws spread over the whole range along the difference only.
         let drawn = found.sample(4000, &mut Streams::new(0).stream("t"));
         let across: Vec<Vec<f64>> = drawn
             .iter()
@@ -308,7 +313,8 @@ mod tests {
 
     #[test]
     fn a_minimum_outside_of_the_range_piles_up_at_its_edge() {
-        // 5 deviations outside: density falls off by e over a fifth of a deviation.
+        // 5 standard deviations outside: the density falls off by a factor e over a fifth of a
+        // standard deviation.
         let found = seen(&[1.732 + 0.5], &[100.0]);
         let drawn = found.sample(4000, &mut Streams::new(2).stream("t"));
         let mean = drawn.iter().map(|z| 1.732 - z[0]).sum::<f64>() / 4000.0;

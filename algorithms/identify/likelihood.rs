@@ -1,9 +1,10 @@
 //! The likelihood of real episodes under a simulator.
 //!
-//! A point of the search space is `[z, s_1, s_2, …]`: the unknowns (but for those that
-//! are held at a value) in prior-scaled coordinates, then the start pose of each episode as an offset from what its
-//! first reading shows, in standard deviations of that reading. The episode's
-//! commands are replayed from there; what differs from the readings, divided by
+//! A point of the search space is `[z, s_1, s_2, …]`. `z` are the unknowns in prior-scaled
+//! coordinates, without those held at a value. `s_k` is the start pose of episode `k`: an offset
+//! from what its first reading shows, in standard deviations of that reading.
+//!
+//! The episode's commands are replayed from there. The difference from the readings, divided by
 //! their noise, is the whitened residual. Systematic errors of the trackers are integrated out; see
 //! [`asid_readings::systematic`].
 
@@ -14,24 +15,24 @@ use asid_readings::replay::Replay;
 use asid_readings::{SignalSet, SystematicErrors};
 use rand_distr::{Distribution, StandardNormal};
 
-/// How far a start pose may lie from its first reading, in standard deviations of that reading.
+/// Largest offset of a start pose from its first reading, in standard deviations of that reading.
 const START_BOUND: f64 = 6.0;
 
-/// Draws that measure how the tracker's noise spreads the located start pose.
+/// Number of draws that measure how the tracker's noise spreads the located start pose.
 const LOCATE_DRAWS: usize = 256;
 
 struct Observed {
     replay: Replay,
     readings: Vec<f64>,
-    /// Times of the rows, s, and which entries of a whitened difference are there.
+    /// Times of the rows, s, and whether each entry of a whitened difference is present.
     time: Vec<f64>,
     there: Vec<bool>,
-    /// Start pose located by the first complete reading, and its deviation.
+    /// Start pose located by the first complete reading, and its standard deviation.
     start: Vec<f64>,
     start_std: Vec<f64>,
 }
 
-/// Likelihood of some episodes, for a whole population of points at once.
+/// Likelihood of some episodes, evaluated for a whole population of points at once.
 pub struct Likelihood<'a> {
     problem: &'a Problem<'a>,
     batch: Batch,
@@ -41,7 +42,7 @@ pub struct Likelihood<'a> {
     episodes: Vec<Observed>,
     predicted: Vec<f64>,
     present: usize,
-    /// Values of the unknowns that are not searched for.
+    /// Values of the unknowns that are held and not searched for.
     fixed: Vec<Option<f64>>,
 }
 
@@ -85,7 +86,7 @@ impl<'a> Likelihood<'a> {
                     .iter_mut()
                     .zip(problem.task.locate(&noisy).iter().zip(&start))
                 {
-                    // Angles may jump by a turn; a jump is no spread.
+                    // Angles may jump by a full turn, which is no spread.
                     let d = a - b;
                     let turn = std::f64::consts::PI;
                     let d = if d.abs() > turn {
@@ -127,25 +128,25 @@ impl<'a> Likelihood<'a> {
         })
     }
 
-    /// The same with systematic errors of the trackers integrated out.
+    /// The same likelihood with systematic errors of the trackers integrated out.
     #[must_use]
     pub fn with_tracker(mut self, tracker: TrackerPrior) -> Self {
         self.tracker = tracker;
         self
     }
 
-    /// Largest population.
+    /// Largest population that is simulated in one batch.
     #[must_use]
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// Holds some unknowns at a value: they are no entries of a point any more.
+    /// Holds some unknowns at a value; they are then no entries of a point.
     pub fn hold(&mut self, values: &[Option<f64>]) {
         self.fixed.copy_from_slice(values);
     }
 
-    /// Unknowns that are entries of a point.
+    /// Number of unknowns that are entries of a point.
     #[must_use]
     pub fn sought(&self) -> usize {
         self.fixed.iter().filter(|f| f.is_none()).count()
@@ -161,7 +162,7 @@ impl<'a> Likelihood<'a> {
             .collect()
     }
 
-    /// Entries of a point.
+    /// Number of entries of a point.
     #[must_use]
     pub fn dimension(&self) -> usize {
         self.sought() + self.episodes.iter().map(|e| e.start.len()).sum::<usize>()
@@ -183,7 +184,7 @@ impl<'a> Likelihood<'a> {
         (high.iter().map(|x| -x).collect(), high)
     }
 
-    /// Number of readings' entries that are present.
+    /// Number of reading entries that are present.
     #[must_use]
     pub fn present(&self) -> usize {
         self.present
@@ -215,8 +216,10 @@ impl<'a> Likelihood<'a> {
             .collect()
     }
 
-    /// Whitened residuals (predicted minus observed) of all episodes at each point, one
-    /// entry a reading, zero where it is missing; `None` where a simulation diverged.
+    /// Whitened residuals (predicted minus observed) of all episodes at each point; `None` where a
+    /// simulation diverged.
+    ///
+    /// There is one residual per reading entry, zero where the reading is missing.
     ///
     /// # Errors
     /// When the engine fails.

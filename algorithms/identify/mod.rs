@@ -1,9 +1,9 @@
-//! Identification: fit the simulator to real episodes and say how sure that is.
+//! Identification: fits the simulator to real episodes and quantifies the uncertainty.
 //!
-//! A search (CEM, REPS or CMA-ES) finds where the likelihood is, with the start pose of
-//! each episode co-estimated; then draws around its end, and a smooth model of what
-//! they predict, give a posterior. The interval comes from the likelihood, never from
-//! the spread of an elite, which measures only how far a search has converged.
+//! A search (CEM, REPS or CMA-ES) locates the likelihood's maximum, with the start pose of each
+//! episode co-estimated. Draws around its end, and a smooth model of their predictions, then give a
+//! posterior. The interval comes from the likelihood and not from the spread of an elite, which
+//! only measures how far a search has converged.
 
 pub mod articulation;
 pub mod beyond;

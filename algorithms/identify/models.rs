@@ -1,24 +1,26 @@
-//! Binary unknowns: one model for each combination of their values, each fitted by
-//! itself, and the probability of each.
+//! Binary unknowns: one model per combination of their values, each fitted separately, and the
+//! probability of each.
 //!
-//! The evidence of a model is `exp(-loss / c)` at its best point times the share of the
-//! prior that its posterior takes (Laplace's approximation, per unknown). `c`, at
-//! least 1, is how much worse than the sensors' noise allows the best model of all
-//! explains the readings: what no model explains speaks for none of them.
+//! The evidence of a model is `exp(-loss / c)` at its best point times the share of the prior that
+//! its posterior takes (Laplace's approximation, per unknown). `c`, at least 1, is the misfit of
+//! the best model relative to the sensors' noise. A misfit that no model explains then supports
+//! none of them.
 
 use asid_core::identify::Identified;
 use asid_core::{Error, Parameter, Posterior, Result};
 
 use super::sampling::Evidence;
 
-/// More binary unknowns than this make too many models.
+/// Largest number of binary unknowns: each doubles the number of models to fit.
 const MAX_BINARY: usize = 5;
 
-/// A model this many nats behind the best after the search is not looked at any more.
+/// A model this many nats behind the best after the search is dropped.
 const HOPELESS: f64 = 100.0;
 
-/// All combinations of the binary unknowns' values: one entry an unknown, `None` for the
-/// others. One model without any value where no unknown is binary.
+/// All combinations of the binary unknowns' values: one entry per unknown, `None` for those that
+/// are not binary.
+///
+/// Without binary unknowns there is one model, with `None` for every unknown.
 ///
 /// # Errors
 /// When there are too many binary unknowns.
@@ -43,7 +45,7 @@ pub fn all(parameters: &[Parameter]) -> Result<Vec<Vec<Option<f64>>>> {
         .collect())
 }
 
-/// What a difference of losses counts.
+/// Scale of loss differences between models.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     best: f64,
@@ -51,7 +53,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// From the losses of all models and the number of readings' entries.
+    /// Scale from the losses of all models and the number of reading entries that are present.
     #[must_use]
     pub fn new(losses: impl Iterator<Item = f64>, present: usize) -> Self {
         let best = losses.fold(f64::INFINITY, f64::min);
@@ -66,15 +68,15 @@ impl Scale {
         (loss - self.best) / self.mismatch
     }
 
-    /// Whether a model need not be looked at any more.
+    /// Whether a model is too far behind to be considered further.
     #[must_use]
     pub fn is_hopeless(self, loss: f64) -> bool {
         self.behind(loss) > HOPELESS
     }
 }
 
-/// The posterior over all models, each with its probability; what else was identified is
-/// that of the most probable one.
+/// The posterior over all models, each weighted by its probability; all else is that of the most
+/// probable model.
 ///
 /// # Errors
 /// When there is no model.
@@ -153,16 +155,16 @@ mod tests {
 
     #[test]
     fn the_probability_is_the_ratio_of_the_evidences() {
-        // 50 readings at noise: a loss of 25; the other model is ln 3 behind.
+        // 50 readings at noise level: a loss of 25; the other model is ln 3 behind.
         let found = vec![model(0.0, 25.0 + 3.0_f64.ln(), 0.0), model(1.0, 25.0, 0.0)];
         let identified = average(&parameters(), found, 50).unwrap();
         assert!((identified.posterior.marginals[0].estimate - 0.75).abs() < 1e-9);
         assert_eq!(identified.starts, vec![vec![1.0]]);
-        // A model pays for what it had to find.
+        // A model is penalised for the unknowns that it had to find.
         let found = vec![model(0.0, 25.0, 0.0), model(1.0, 25.0, -(4.0_f64.ln()))];
         let identified = average(&parameters(), found, 50).unwrap();
         assert!((identified.posterior.marginals[0].estimate - 0.2).abs() < 1e-9);
-        // Readings that no model explains (4 times the loss) count for less.
+        // With misfit that no model explains (4 times the loss), differences count for less.
         let found = vec![model(0.0, 104.0, 0.0), model(1.0, 100.0, 0.0)];
         let identified = average(&parameters(), found, 50).unwrap();
         let wanted = 1.0 / (1.0 + (-1.0_f64).exp());

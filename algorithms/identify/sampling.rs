@@ -1,10 +1,9 @@
 //! From a search to a posterior.
 //!
-//! A search says where the likelihood is; how wide it is there is
-//! another question, and the spread of an elite does not answer it. So rounds of
-//! draws over a region around the search's end follow. Each round fits an
-//! [`Emulator`] to all points inside the region, and the emulator's posterior makes
-//! the next region: narrower where the data tell more, wider where it was too narrow.
+//! A search locates the likelihood's maximum. It does not measure its width, and neither does the
+//! spread of an elite. So rounds of draws over a region around the search's end follow. Each round
+//! fits an [`Emulator`] to all points inside the region. The emulator's posterior makes the next
+//! region: narrower where the data are informative, wider where the region was too narrow.
 
 use asid_core::identify::{Identified, IterationSummary};
 use asid_core::posterior::weighted_quantile;
@@ -17,11 +16,15 @@ use super::Likelihood;
 use super::emulator::{Emulator, REACH, features_len};
 use crate::optimise::{Gaussian, require};
 
-/// Deviations of a region, of the [`REACH`] that is looked over, beyond which a posterior's mean says that the likelihood is
-/// better still outside: its width there is that of a tail which the region cuts.
+/// Offset of a posterior's mean from the region's middle, in standard deviations of the region
+/// ([`REACH`] are searched), above which the region moves without narrowing.
+///
+/// The likelihood is then still better outside. The posterior's width is that of a tail cut off by
+/// the region, and no measure of its true width.
 const OUTSIDE: f64 = 2.0;
 
-/// Rounds at most, in those of the settings: a region that moves gives its round for it.
+/// Maximum number of rounds, in multiples of those of the settings: a round that only moves the
+/// region does not count as one of these.
 const PATIENCE: usize = 3;
 
 /// How the posterior is sampled after the search.
@@ -30,15 +33,16 @@ const PATIENCE: usize = 3;
 pub struct SamplingSettings {
     /// Rounds of draws.
     pub rounds: usize,
-    /// Draws a round; at least three for each feature of the emulator are taken.
+    /// Draws per round; at least three per feature of the emulator are taken.
     pub draws: usize,
-    /// Deviations of the next region in units of the posterior's.
+    /// Standard deviations of the next region in units of the posterior's.
     pub widen: f64,
-    /// Samples of the posterior that are kept.
+    /// Number of posterior samples that are kept.
     pub samples: usize,
-    /// Whether readings are weighed by how roughness runs along the episode, or by its size alone.
+    /// Whether readings are weighted by the whole covariance of the roughness along the episode, or
+    /// by its variance alone.
     pub correlated: bool,
-    /// How far the search goes on past an end of a prior's range where the posterior piles up there, in
+    /// How far the search continues past an end of a prior's range where the posterior piles up, in
     /// widths of the range; 0 keeps it inside.
     pub beyond: f64,
 }
@@ -57,7 +61,7 @@ impl Default for SamplingSettings {
 }
 
 impl SamplingSettings {
-    /// Checks that there is something to draw.
+    /// Checks that each setting is in its domain.
     ///
     /// # Errors
     /// [`Error::Config`] naming the setting.
@@ -90,14 +94,14 @@ impl SamplingSettings {
         )
     }
 
-    /// Draws a round for a search space of `n` entries.
+    /// Draws per round for a search space of `n` entries.
     #[must_use]
     pub fn draws_for(&self, n: usize) -> usize {
         self.draws.max(3 * features_len(n))
     }
 }
 
-/// Everything that was simulated.
+/// All points that were simulated, with their residuals and losses.
 #[derive(Default)]
 pub struct Samples {
     points: Vec<Vec<f64>>,
@@ -106,8 +110,9 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Adds points with their residuals, and returns the loss of each: half the sum of
-    /// squares, infinite where the simulation diverged.
+    /// Adds points with their residuals; returns the loss of each.
+    ///
+    /// The loss is half the sum of squares, infinite where the simulation diverged.
     pub fn add(&mut self, points: &[Vec<f64>], residuals: Vec<Option<Vec<f64>>>) -> Vec<f64> {
         let mut losses = Vec::with_capacity(points.len());
         for (point, residual) in points.iter().zip(residuals) {
@@ -130,8 +135,7 @@ impl Samples {
         self.losses.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Where the likelihood is: a fit to the `count` best points, weighted by rank, so that
-    /// it is not carried by the luck of one.
+    /// Fit to the `count` best points, weighted by rank so that no single lucky point dominates.
     fn elite(&self, count: usize, low: &[f64], high: &[f64]) -> Result<Gaussian> {
         let mut order: Vec<usize> = (0..self.losses.len()).collect();
         order.sort_by(|&i, &j| self.losses[i].total_cmp(&self.losses[j]));
@@ -144,7 +148,7 @@ impl Samples {
     }
 }
 
-/// Quantiles of the unknowns over points, for pictures.
+/// Quantiles of the unknowns over points, for plots.
 #[must_use]
 pub fn summary(
     likelihood: &Likelihood<'_>,
@@ -165,18 +169,18 @@ pub fn summary(
     }
 }
 
-/// What speaks for a model.
+/// Evidence for a model.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence {
-    /// Half the sum of squared residuals at the emulator's best point. The best of the
-    /// draws is a matter of luck, which would tell models apart that no reading tells apart.
+    /// Half the sum of squared residuals at the emulator's best point. The best single draw is
+    /// partly luck, which would favour one of two models that no reading distinguishes.
     pub loss: f64,
-    /// Logarithm of the posterior's deviations over the prior's, summed: what a model
-    /// pays for unknowns that had to be found.
+    /// Sum of the logarithms of posterior over prior standard deviations: the penalty for unknowns
+    /// that had to be found.
     pub narrowing: f64,
 }
 
-/// Rounds of draws after a search, the posterior, and what speaks for it.
+/// Runs rounds of draws after a search; returns the posterior and its evidence.
 ///
 /// # Errors
 /// When the engine fails or nearly every simulation diverged.

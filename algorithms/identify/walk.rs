@@ -1,22 +1,22 @@
-//! Draws from a density that is known up to a factor, by a Metropolis walk inside a region.
+//! Draws from an unnormalised density by a Metropolis walk inside a region.
 
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Steps before the first draw is kept.
+/// Steps before the first draw is kept: the walk has then forgotten where it began.
 const WARM_UP: usize = 2000;
-/// Steps from one draw that is kept to the next: neighbours repeat each other.
+/// Steps between two kept draws, since neighbouring steps are correlated.
 const THIN: usize = 10;
 
-/// Length of a step in deviations of the target over the root of its entries (Gelman, Roberts and
-/// Gilks 1996).
+/// Length of a step, in standard deviations of the target divided by the square root of the number
+/// of entries (Gelman, Roberts and Gilks 1996).
 const STEP: f64 = 2.4;
 
-/// A walk.
+/// A Metropolis walk.
 pub struct Walk<'w> {
-    /// Lower triangular: its square is about the target's covariance.
+    /// Lower triangular factor; `shape shape^T` is roughly the target's covariance.
     pub shape: DMatrix<f64>,
     /// Whether a point is inside the region.
     pub inside: &'w dyn Fn(&[f64]) -> bool,
@@ -25,7 +25,7 @@ pub struct Walk<'w> {
 }
 
 impl Walk<'_> {
-    /// `count` equally weighted draws from a point inside the region on.
+    /// Returns `count` equally weighted draws; the walk starts at a point inside the region.
     pub fn draws(&self, from: &[f64], count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = from.len();
         let shape = &self.shape * (STEP / (n as f64).sqrt());

@@ -4,23 +4,23 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, UnitQuaternion, Ve
 
 use super::{Joint, Noise};
 
-/// Entries of the fit besides the angles: mean pose, axis, origin.
+/// Number of fitted entries of the mean pose; entries of axis and origin follow them.
 pub const POSE: usize = 6;
 
-/// Steps of the least squares.
+/// Maximum number of least-squares steps.
 const STEPS: usize = 30;
 
-/// Step of the difference quotients.
+/// Step of the difference quotients, m or rad.
 const DELTA: f64 = 1e-6;
 
-/// A relative pose and what whitens its residual.
+/// A relative pose and the matrix that whitens its residual.
 pub struct Reading {
     pose: Isometry3<f64>,
     whitener: Matrix6<f64>,
 }
 
 impl Reading {
-    /// `None` where the noise is zero.
+    /// Reading with the noise of both trackers; `None` where the noise is zero.
     pub fn new(pose: Isometry3<f64>, [fixed, moving]: [Noise; 2]) -> Option<Self> {
         let arm = pose.translation.vector.cross_matrix();
         let (a, b) = (fixed.rotation.powi(2), moving.rotation.powi(2));
@@ -43,7 +43,7 @@ impl Reading {
         Some(Self { pose, whitener })
     }
 
-    /// Whitened residual: this reading against a predicted pose.
+    /// Whitened residual of this reading against a predicted pose.
     fn residual(&self, predicted: &Isometry3<f64>) -> Vector6<f64> {
         let shift = self.pose.translation.vector - predicted.translation.vector;
         let turn = (self.pose.rotation * predicted.rotation.inverse()).scaled_axis();
@@ -51,7 +51,7 @@ impl Reading {
     }
 }
 
-/// Mean pose, axis and origin of a trial.
+/// Mean pose, axis and origin: one point of the least-squares search.
 #[derive(Clone)]
 pub struct Trial {
     /// The kind of joint.
@@ -73,8 +73,8 @@ impl Trial {
         }
     }
 
-    /// The trial a step away: position and rotation of the mean, then the axis tilted and the
-    /// origin moved across it.
+    /// The trial after a step: position and rotation of the mean pose, then the tilt of the axis
+    /// and the shift of the origin across it.
     fn moved(&self, step: &[f64]) -> Self {
         let mut out = self.clone();
         out.mean.translation.vector += Vector3::new(step[0], step[1], step[2]);
@@ -90,7 +90,7 @@ impl Trial {
         out
     }
 
-    /// Relative pose where the joint has moved by `q` from the mean.
+    /// Relative pose where the joint's coordinate is `q` (0 at the mean pose).
     fn pose(&self, q: f64) -> Isometry3<f64> {
         match self.joint {
             Joint::Rigid => self.mean,
@@ -107,7 +107,7 @@ impl Trial {
         }
     }
 
-    /// Residuals of all readings, the joint's coordinate chosen best for each.
+    /// Residuals of all readings, with the best joint coordinate for each.
     fn residuals(&self, readings: &[Reading], q: &mut [f64]) -> DVector<f64> {
         let mut out = DVector::zeros(6 * readings.len());
         for (k, reading) in readings.iter().enumerate() {
@@ -129,7 +129,7 @@ impl Trial {
     }
 }
 
-/// Two unit vectors across a third.
+/// Two unit vectors perpendicular to the axis and to each other.
 fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let other = if axis.x.abs() < 0.7 {
         Vector3::x()
@@ -150,11 +150,11 @@ pub struct Fit {
     pub loss: f64,
     /// Bayesian information criterion.
     pub bic: f64,
-    /// Covariance of the trial's entries, where the readings tell them.
+    /// Covariance of the trial's entries, where the readings determine it.
     pub covariance: Option<DMatrix<f64>>,
 }
 
-/// The direction in which vectors spread most.
+/// Principal direction of vectors: the one in which they spread most.
 fn principal(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
     let spread: Matrix3<f64> = vectors.map(|v| v * v.transpose()).sum();
     let eigen = spread.symmetric_eigen();
@@ -164,12 +164,12 @@ fn principal(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
         .into_owned()
 }
 
-/// A first trial, and the joint's coordinates in it.
+/// Initial trial, and the joint coordinates in it.
 fn first(joint: Joint, readings: &[Reading]) -> (Trial, Vec<f64>) {
     let n = readings.len() as f64;
     let places = || readings.iter().map(|r| r.pose.translation.vector);
     let center = places().sum::<Vector3<f64>>() / n;
-    // The mean rotation, from a reading on.
+    // Mean rotation, iterated from the middle reading.
     let mut rotation = readings[readings.len() / 2].pose.rotation;
     for _ in 0..10 {
         let off = |r: &Reading| (r.pose.rotation * rotation.inverse()).scaled_axis();
@@ -197,7 +197,8 @@ fn first(joint: Joint, readings: &[Reading]) -> (Trial, Vec<f64>) {
         Joint::Revolute => {
             trial.axis = principal(turns());
             let q: Vec<f64> = turns().map(|t| trial.axis.dot(&t)).collect();
-            // p = (1 - R) origin + R mean, linear in both; along the axis the origin is free.
+            // p = (1 - R) origin + R mean, linear in both; the origin's position along the axis is
+            // free.
             let mut normal = nalgebra::Matrix6::<f64>::identity() * 1e-6;
             let mut right = Vector6::zeros();
             for (angle, p) in q.iter().zip(places()) {
@@ -208,7 +209,7 @@ fn first(joint: Joint, readings: &[Reading]) -> (Trial, Vec<f64>) {
                     .copy_from(&(Matrix3::identity() - turn));
                 a.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
                 normal += a.transpose() * a;
-                // The origin is sought as an offset from the moving part's mean place.
+                // The origin is sought as an offset from the mean position of the moving part.
                 right += a.transpose() * (p - center);
             }
             if let Some(x) = normal.cholesky().map(|c| c.solve(&right)) {
@@ -220,7 +221,7 @@ fn first(joint: Joint, readings: &[Reading]) -> (Trial, Vec<f64>) {
     }
 }
 
-/// The best fit of a kind of joint, by Levenberg's method.
+/// The best fit of a kind of joint, by Levenberg-Marquardt steps.
 pub fn fit(joint: Joint, readings: &[Reading]) -> Fit {
     let (mut trial, mut q) = first(joint, readings);
     let entries = trial.entries();
@@ -238,7 +239,7 @@ pub fn fit(joint: Joint, readings: &[Reading]) -> Fit {
         }
         let normal = jacobian.transpose() * &jacobian;
         let gradient = jacobian.transpose() * &residual;
-        // What the readings do not see stays where it is.
+        // The floor keeps entries that the readings do not determine where they are.
         let floor = DMatrix::identity(entries, entries) * 1e-6;
         covariance = (&normal + &floor).cholesky().map(|c| c.inverse());
         let mut scaled = &normal + floor;
@@ -263,7 +264,7 @@ pub fn fit(joint: Joint, readings: &[Reading]) -> Fit {
             damping *= 8.0;
         }
     }
-    // The mean pose already holds one coordinate.
+    // The mean pose already accounts for one coordinate.
     let coordinates = if joint == Joint::Rigid {
         0
     } else {
