@@ -96,8 +96,8 @@ impl Candidate {
             .collect()
     }
 
-    /// Returns how far a fit may move a parameter: over its range, or [`LARGER`] times as far if
-    /// that range is the one of a machine on a table.
+    /// Returns how far a fit may move a parameter: over its range, or a thousand times as far if
+    /// that is the range of a machine on a table.
     #[must_use]
     pub fn limits(&self, parameter: usize) -> [f64; 2] {
         let range = self.ranges[parameter];

@@ -1,25 +1,28 @@
-//! The ceiling: how much of what is left a flexible model foretells, and with which variable it goes.
+//! The ceiling: how much of the remainder a flexible model can predict, and from which variable.
 //!
-//! A series that a diagnosis leaves (a missing force, a residual) is regressed on variables of the motion: an additive
-//! model of piecewise linear functions of each (Hastie and Tibshirani 1986), with a normal prior on their values at the knots. What counts
-//! is the power that it foretells of episodes that were left out of the fit in turn: noise and chance are not foretold.
+//! The remainder of a diagnosis (a missing force, a residual) is a series that is regressed on
+//! variables of the motion. The model is additive, with a piecewise linear function of each
+//! variable (Hastie and Tibshirani 1986) and a normal prior on its values at the knots. Only the
+//! power that it predicts in cross-validation counts, of episodes left out in turn: noise and
+//! chance are not predicted.
 
 mod additive_model;
 
 use additive_model::{foretold, knots, sums};
 
-/// What a series may go with.
+/// A variable on which a series may depend.
 #[derive(Clone, Debug)]
 pub struct Variable {
     /// Name, such as `speed`.
     pub name: String,
-    /// Kinds of effects that go with it.
+    /// Kinds of effects that depend on it.
     pub kinds: &'static [&'static str],
-    /// Its value in each row.
+    /// Value in each row.
     pub values: Vec<f64>,
 }
 
-/// A series of one episode, with the variables that it may go with; each series of a place has the same ones.
+/// A series of one episode, with the variables on which it may depend; all series of a place have
+/// the same variables.
 #[derive(Clone, Debug)]
 pub struct Course {
     /// The series.
@@ -28,29 +31,30 @@ pub struct Course {
     pub variables: Vec<Variable>,
 }
 
-/// What is foretold of a series.
+/// How much of a series is predictable.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Foretold {
-    /// Share of its power that all variables together foretell, of episodes that no fit saw.
+    /// Share of its power that all variables together predict, in episodes that the fit did not
+    /// see.
     pub share: f64,
-    /// The variable that foretells most by itself; `None` where none foretells any.
+    /// The variable that predicts most by itself; `None` where none predicts any.
     pub variable: Option<String>,
-    /// Kinds of effects that go with it.
+    /// Kinds of effects that depend on that variable.
     pub kinds: Vec<String>,
 }
 
-/// What is left at one place.
+/// The remainder at one place.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Left {
-    /// Joint or sensor.
+    /// Name of the joint or sensor.
     pub place: String,
-    /// Power of what is left, relative to that of the other places.
+    /// Power of the remainder, relative to that of the other places.
     pub weight: f64,
-    /// What is foretold of it.
+    /// How much of it is predictable.
     pub foretold: Foretold,
 }
 
-/// Share of the power that is left at all places together that is foretold.
+/// Returns the predictable share of the power that remains at all places together.
 #[must_use]
 pub fn learnable(left: &[Left]) -> f64 {
     let sum: f64 = left.iter().map(|l| l.weight).sum();
@@ -58,7 +62,8 @@ pub fn learnable(left: &[Left]) -> f64 {
     if sum > 0.0 { foretold / sum } else { 0.0 }
 }
 
-/// The place at which most is foretold; at which most is left, where nothing is.
+/// Returns the place with the most predictable power; the one with the most power, where nothing is
+/// predictable.
 #[must_use]
 pub fn most(left: &[Left]) -> Option<&Left> {
     let foretold = |l: &&Left| l.weight * l.foretold.share;
@@ -67,10 +72,11 @@ pub fn most(left: &[Left]) -> Option<&Left> {
     most.or_else(|| left.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)))
 }
 
-/// Least share that a variable must foretell by itself to be named: less is what a slow series shares with any other slow one.
+/// Least share that a variable must predict by itself to be named: any two slow series have less in
+/// common.
 const NAMED: f64 = 0.05;
 
-/// What the variables foretell of a series.
+/// Returns how much of a series its variables predict.
 #[must_use]
 pub fn learn(courses: &[Course]) -> Foretold {
     let Some(first) = courses.first() else {
@@ -116,7 +122,7 @@ pub fn learn(courses: &[Course]) -> Foretold {
 mod tests {
     use super::*;
 
-    /// Numbers that look like noise, of unit deviation at most.
+    /// Numbers that look like noise, between -1 and 1.
     fn noise(seed: usize, k: usize) -> f64 {
         let x = (12.9898 * k as f64 + 78.233 * seed as f64).sin() * 43_758.545;
         2.0 * (x - x.floor()) - 1.0
@@ -157,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_spring_beside_noise_is_foretold_by_its_share_of_the_power() {
-        // Power of the spring x^2 is 1/2, of the noise 1/3.
+        // The power of the spring x^2 is 1/2, that of the noise 1/3.
         let found = learn(&courses(|x, _, n| x + n));
         assert!((found.share - 0.6).abs() < 0.06, "{found:?}");
         assert_eq!(found.variable.as_deref(), Some("position"));

@@ -1,4 +1,4 @@
-//! Checks before any diagnosis: are the logs and the study's parameters fit for it?
+//! Checks before any diagnosis: whether the logs and the study's parameters are fit for it.
 
 mod identifiability;
 mod missing;
@@ -19,22 +19,25 @@ pub use identifiability::identifiability;
 pub use missing_force::{missing_force, windows};
 pub use units::units;
 
-/// Share of missing readings that is still called good.
+/// Largest share of missing readings that passes the check.
 const MISSING: f64 = 0.2;
-/// Readings of the training logs for each coordinate of a start that they leave open, below which there is too little for a diagnosis: fewer
-/// than three numbers for each that is fitted leave hardly a residual (a regression wants ten, Harrell 2015, section 4.4).
+/// Fewest readings of the training logs per unknown coordinate of an initial state.
+///
+/// With fewer than three per fitted number there are hardly any degrees of freedom left for
+/// residuals (a regression needs ten, Harrell 2015, section 4.4).
 const READINGS: usize = 3;
-/// An engine's own error, in changes by half the time step: what is of first order in the step (Richardson 1911), the worst
-/// that engines have.
+/// Ratio of an engine's own error to the change at half the time step.
+///
+/// It holds for errors of first order in the step (Richardson 1911), the worst among engines.
 pub const RICHARDSON: f64 = 2.0;
-/// Root mean square change by a halved time step that does not matter, in units of the noise.
+/// Root mean square change at half the time step that does not matter, in units of the noise.
 const FINE: f64 = 0.5;
 
-/// Correlation of noise from one reading to the next from which on it is said: below it an estimate from a few hundred rows
-/// scatters about 0.
+/// Correlation of noise from one reading to the next from which on it is reported: below it an
+/// estimate from a few hundred rows scatters about 0.
 const COLOURED: f64 = 0.2;
 
-/// A check by its name.
+/// Makes the result of a check.
 fn check(name: &str, ok: bool, detail: String) -> CheckResult {
     CheckResult {
         check: name.into(),
@@ -43,7 +46,8 @@ fn check(name: &str, ok: bool, detail: String) -> CheckResult {
     }
 }
 
-/// Readings present, lengths, and whether these are enough for starts of which `open` coordinates are unknown.
+/// Counts readings and lengths, and checks whether they are enough for initial states with `open`
+/// unknown coordinates.
 #[must_use]
 pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
     let readings = |logs: &Logs| logs.present().iter().filter(|p| **p).count();
@@ -81,7 +85,8 @@ pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
     )
 }
 
-/// Whether each sensor's noise is white: where it was filtered, its deviation is larger than neighbouring readings show.
+/// Describes whether each sensor's noise is white: where it was filtered, its deviation is larger
+/// than neighbouring readings show.
 #[must_use]
 pub fn whiteness(logs: &Logs, residuals: &[Vec<f64>]) -> CheckResult {
     let noise = crate::noise::describe(logs, residuals);
@@ -101,7 +106,7 @@ pub fn whiteness(logs: &Logs, residuals: &[Vec<f64>]) -> CheckResult {
     check("noise", true, detail)
 }
 
-/// How far replays can be repeated where bodies touch.
+/// Describes how well replays repeat where bodies touch.
 #[must_use]
 pub fn repeatability(repeats: Repeats) -> CheckResult {
     let segments = if repeats.duration.is_finite() {
@@ -124,8 +129,10 @@ pub fn repeatability(repeats: Repeats) -> CheckResult {
     )
 }
 
-/// Change of the predictions of the training logs by an explanation at a halved time step, in units of the noise; `halved` is the same
-/// machine with half of it.
+/// Returns the change of an explanation's predictions of the training logs at half the time step,
+/// in units of the noise.
+///
+/// `halved` is the same machine with half of the step.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -142,21 +149,25 @@ pub fn change_by_step(bench: &Bench, of: &Explanation, halved: &Machine) -> Resu
     Ok(here.iter().zip(&there).map(|(a, b)| a - b).collect())
 }
 
-/// The gap that a change of the predictions leaves, in deviations of the noise: `residuals` less the change.
+/// Returns the gap after a change of the predictions, in standard deviations of the noise: that of
+/// `residuals` less the change.
 fn gap_after(residuals: &[f64], change: &[f64], readings: f64) -> f64 {
     let pairs = residuals.iter().zip(change);
     let left: Vec<f64> = pairs.map(|(r, c)| r - c).collect();
     (cost(&left) / readings).sqrt()
 }
 
-/// Whether a gap is the time step's: half of the step changes the predictions by a good part of it, and brings them nearer to the logs.
-/// Logs that the step as it is replays, as those of the same simulation, are further from replays of half of it.
+/// Whether a gap is due to the time step: half of the step changes the predictions by a good part
+/// of the gap and brings them closer to the logs.
+///
+/// Logs that the present step reproduces, as those of the same simulation, are further from replays
+/// at half of it.
 fn is_of_the_step(change: f64, gap: f64, finer: f64) -> bool {
     let matters = change >= FINE && change >= 0.5 * gap && gap > LEAST_GAP;
     matters && finer < gap
 }
 
-/// Does the gap depend on the time step? `halved` is the same machine with half of it.
+/// Checks whether the gap depends on the time step; `halved` is the same machine with half of it.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -191,14 +202,15 @@ mod tests {
 
     #[test]
     fn a_gap_is_of_the_time_step_only_where_half_of_it_is_nearer_to_the_logs() {
-        // An error of first order: the logs are two changes away, and half of the step goes one of them.
+        // An error of first order: the logs are two changes away, and half of the step covers one
+        // of them.
         let change = [1.5, -1.5, 1.5, -1.5];
         let away = change.map(|c| 2.0 * c);
         let gap = (cost(&away) / 4.0).sqrt();
         let finer = gap_after(&away, &change, 4.0);
         assert!((finer - 1.5).abs() < 1e-12);
         assert!(is_of_the_step(1.5, gap, finer));
-        // Logs of the same simulation, with an error of their own that has nothing to do with the step.
+        // Logs of the same simulation, with an error of their own that is unrelated to the step.
         let own = [1.2, 1.2, 1.2, 1.2];
         let gap = (cost(&own) / 4.0).sqrt();
         let finer = gap_after(&own, &change, 4.0);

@@ -1,8 +1,9 @@
-//! The next experiment: commands under which rival explanations predict most differently.
+//! The next experiment: commands under which the predictions of rival explanations differ most.
 //!
-//! The commands of a training episode are played faster or slower, larger or smaller (`variation`), in the models of the rivals. Of those
-//! that differ most the ones count that the machine may play (`limits`), and by what is left of the difference when both rivals are
-//! fitted anew (`apart`): it says how well one such episode would tell them apart.
+//! The models of the rivals replay the commands of a training episode faster or slower, larger or
+//! smaller (`variation`). Motions that differ most are tried first. A motion counts only if the
+//! machine may play it (`limits`). It is rated by the difference that remains once both rivals are
+//! fitted again (`apart`): how well one such episode would distinguish them.
 
 mod apart;
 mod limits;
@@ -22,39 +23,47 @@ use apart::apart;
 use limits::Limits;
 use variation::{VARIATIONS, Variation};
 
-/// Divergence per episode, in the likelihood's unit, from which on one episode is enough: its square root, 4.5 deviations, no chance makes.
+/// Divergence per episode, as a difference of log-likelihoods times two, from which on one episode
+/// is enough.
+///
+/// Its square root is 4.5 standard deviations, which chance does not reach.
 const ENOUGH: f64 = 20.0;
-/// Divergence below which a motion is not worth its play: the predictions differ by less than a deviation, which noise does to any two.
+/// Divergence below which a motion is not worth playing: the predictions differ by less than one
+/// standard deviation, as any two do by noise.
 const TELLS: f64 = 1.0;
-/// What is said where no motion is worth its play.
+/// Text for the case that no motion is worth playing.
 const NONE_TELLS: &str = "none of these motions tells more: refitted, the two predictions differ by less than one standard deviation of \
                           the noise over an episode; a motion of another kind is needed";
-/// Motions that are looked at more closely: one of each variation, at the cost of some replays of a single episode.
+/// Number of motions that are examined more closely: one of each variation, at the cost of some
+/// replays of a single episode each.
 const CLOSER: usize = VARIATIONS.len();
 
-/// Name of the file of its commands.
+/// Name of the file with the proposed commands.
 const FILE: &str = "next.csv";
 
-/// An explanation with the trials that it was fitted from.
+/// An explanation, and the trials from which it was fitted.
 type Rival<'r> = (&'r [Trial<'r>], &'r Explanation);
 
-/// The next experiment, and the commands to play.
+/// The proposed next experiment, with the commands to play.
 #[derive(Clone, Debug, Default)]
 pub struct Proposed {
-    /// What it would tell apart, and how.
+    /// What it would distinguish, and how.
     pub told: NextExperiment,
-    /// Its commands, without readings; `None` where there are none.
+    /// Its commands, without readings; `None` if there are none.
     pub commands: Option<Episode>,
 }
 
-/// A training episode with its commands varied, and how far the rivals predict it apart, a sum of squares in units of the noise.
+/// A training episode with varied commands.
+///
+/// `apart` is the difference between the rivals' predictions, a sum of squares in units of the
+/// noise.
 struct Motion {
     episode: usize,
     variation: Variation,
     apart: f64,
 }
 
-/// Finds what would tell two explanations apart.
+/// Finds the motion that would best distinguish two explanations.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -88,12 +97,14 @@ pub fn next(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Proposed>
     Ok(Proposed { told, commands })
 }
 
-/// Whether a motion that is this far apart, a sum of squares in units of the noise, is worth its play.
+/// Whether a motion is worth playing; `apart` is a sum of squares in units of the noise.
 fn tells(apart: f64) -> bool {
     apart >= TELLS
 }
 
-/// Tells how a motion repeats an episode, and names the file of its commands: these, `None` for a machine without any.
+/// Describes how a motion repeats an episode, and names the file of its commands.
+///
+/// Returns these commands; `None` for a machine without actuators.
 fn repeat(bench: &Bench, motion: &Motion, told: &mut NextExperiment) -> Option<Episode> {
     let episode = &bench.train.logs.episodes[motion.episode];
     let layout = bench.layout();
@@ -111,7 +122,7 @@ fn repeat(bench: &Bench, motion: &Motion, told: &mut NextExperiment) -> Option<E
     })
 }
 
-/// By how much two predictions differ, and how many episodes it takes where one is too few.
+/// Describes how far two predictions differ, and how many episodes are needed where one is too few.
 fn differ(apart: f64) -> String {
     let deviations = apart.sqrt();
     let mut text = format!(
@@ -126,7 +137,7 @@ fn differ(apart: f64) -> String {
     text
 }
 
-/// The motion that tells most of those that the machine may play.
+/// Returns the most informative motion among those that the machine may play.
 fn best(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Option<Motion>> {
     let mut motions = all(bench, one, other)?;
     motions.sort_by(|a, b| b.apart.total_cmp(&a.apart));
@@ -134,7 +145,7 @@ fn best(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Option<Motion
     let mut best: Option<Motion> = None;
     for motion in motions.into_iter().take(CLOSER) {
         if best.as_ref().is_some_and(|b| b.apart >= motion.apart) {
-            // Fitted anew they are never further apart.
+            // A new fit never increases the difference.
             break;
         }
         let record = varied(
@@ -157,7 +168,8 @@ fn best(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Option<Motion
     Ok(best)
 }
 
-/// For each variation the training episode whose predictions are furthest apart as the rivals were fitted.
+/// Returns for each variation the training episode whose predictions differ most, with the rivals
+/// as fitted.
 fn all(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Vec<Motion>> {
     let episodes: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
     let variations = if bench.layout().nu() == 0 {
@@ -194,7 +206,7 @@ fn all(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Vec<Motion>> {
     Ok(motions)
 }
 
-/// Some training episodes with their commands varied.
+/// Makes a record of some training episodes with varied commands.
 fn varied(
     bench: &Bench,
     episodes: &[usize],
@@ -214,7 +226,8 @@ fn varied(
     Ok(Record::new(varied, starts))
 }
 
-/// What is known of a pair of confounded effects.
+/// Returns the known way to distinguish a pair of confounded effects, as a part of a sentence;
+/// empty if none is known.
 fn hint(one: &Explanation, other: &Explanation) -> String {
     let of = |a: &Explanation, b: &Explanation| {
         a.effects.iter().find_map(|effect| {
@@ -231,7 +244,7 @@ fn hint(one: &Explanation, other: &Explanation) -> String {
 mod tests {
     use super::*;
 
-    /// Symptom: motions that tell nothing were proposed, to be repeated hundreds of times.
+    /// Symptom: motions without information were proposed, to be repeated hundreds of times.
     #[test]
     fn a_motion_that_is_proposed_takes_no_more_than_twenty_plays() {
         assert!(!tells(0.99 * 0.99) && !tells(0.0) && !tells(f64::NAN));

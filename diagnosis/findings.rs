@@ -1,4 +1,4 @@
-//! What a search found: sets of effects with their replays, and what is told of them.
+//! What a search found: sets of effects with their replays, and what is reported about them.
 
 use crate::bench::{Explanation, Trial};
 use crate::candidate::Candidate;
@@ -6,21 +6,23 @@ use crate::ceiling::Left;
 use crate::result::{DetectionLimit, Isolability, MissingForce, NotTried, RankedSet};
 use crate::trace::ForceTrace;
 
-/// Excess of the root mean square residual, in units of the noise, that no further effect
-/// is looked for below: another program's version of the same effect leaves as much.
+/// Excess of the root mean square residual, in units of the noise, below which no further effect is
+/// searched for.
+///
+/// Another program's version of the same effect leaves as much.
 pub const NEGLIGIBLE: f64 = 2.0;
 
-/// Gap without effects, in deviations of the noise, up to which nothing is there to be closed: noise that is estimated from a
-/// log is right to some hundredths.
+/// Gap without effects, in standard deviations of the noise, up to which there is nothing to close:
+/// noise that is estimated from a log is right to some hundredths.
 pub const LEAST_GAP: f64 = 1.1;
 
-/// What a cost per reading has beyond the noise, as a root mean square.
+/// Returns the root mean square of what a cost per reading has beyond the noise.
 #[must_use]
 pub fn excess(cost_per_reading: f64) -> f64 {
     (cost_per_reading - 1.0).max(0.0).sqrt()
 }
 
-/// An explanation with the candidates behind it.
+/// An explanation with its candidates.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Indices of the candidates, in the order in which they were added.
@@ -29,44 +31,46 @@ pub struct Found {
     pub explanation: Explanation,
 }
 
-/// What a search found.
+/// Result of a search.
 pub struct Findings {
-    /// Without any effect.
+    /// The explanation without effects.
     pub none: Explanation,
-    /// Sets of effects that were replayed, the one that stands first, then its rivals by their evidence.
+    /// Sets of effects that were replayed: the set that stands, then its rivals by evidence.
     pub found: Vec<Found>,
-    /// The force that is missing at each degree of freedom; empty where bodies touch all the time.
+    /// The missing force at each degree of freedom; empty where bodies touch all the time.
     pub missing: Vec<MissingForce>,
-    /// The same along the logs, where most is missing.
+    /// The missing force along the logs, where most is missing.
     pub forces: Vec<ForceTrace>,
-    /// Sets of effects by their evidence.
+    /// Sets of effects, ranked by evidence.
     pub ranking: Vec<RankedSet>,
-    /// Which of the leading effects the logs tell apart.
+    /// Which of the leading effects the logs distinguish.
     pub isolability: Option<Isolability>,
-    /// The smallest size of each effect that the logs could have shown, where that is known.
+    /// The smallest size of each effect that the logs could have shown, where it is known.
     pub detection_limits: Vec<DetectionLimit>,
-    /// Probability of as much evidence for the best candidate where nothing is missing, where that is known.
+    /// Probability that the best candidate shows as much evidence where nothing is missing, if
+    /// known.
     pub p_value: Option<f64>,
-    /// What the best explanation leaves of the missing force, where it was estimated.
+    /// What the best explanation leaves of the missing force, where that was estimated.
     pub left: Vec<Left>,
-    /// How far what is replayed can be repeated; `None` where nothing touches.
+    /// How well replays repeat; `None` where nothing touches.
     pub repeats: Option<Repeats>,
-    /// What was left out because the work was stopped.
+    /// What was skipped because the work was stopped.
     pub not_tried: Vec<NotTried>,
 }
 
-/// How far replays of logs in which bodies touch can be repeated.
+/// How well replays of logs in which bodies touch can be repeated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Repeats {
-    /// Duration of the longest segments that were tried, s; infinite for whole stretches of contact.
+    /// Duration of the longest segments that were tried, s; infinite for whole stretches of
+    /// contact.
     pub duration: f64,
     /// Share of their rows that scatter by more than the noise.
     pub lost: f64,
-    /// Whether that was too much, and shorter ones stand.
+    /// Whether that was too much, so that shorter segments are used.
     pub scatters: bool,
 }
 
-/// The effects of an explanation as trials with their fitted values.
+/// Returns the effects of an explanation as trials with their fitted values.
 #[must_use]
 pub fn trials<'a>(
     candidates: &'a [Candidate],

@@ -10,17 +10,17 @@ use asid_mjcf::Plant;
 
 use crate::home::default_state;
 
-/// A scene compiled by an engine, what is known of its machine, and what the study's model
-/// file has set and added already.
+/// A scene compiled by an engine, its machine, and the values and effects that the study's model
+/// file has set and added.
 #[derive(Clone)]
 pub struct Machine {
     /// The engine.
     pub backend: Arc<dyn Backend>,
-    /// The document.
+    /// The scene document.
     pub scene: Scene,
     /// The machine.
     pub plant: Arc<Plant>,
-    /// Threads; 0 for one a core.
+    /// Number of threads; 0 for one per core.
     pub threads: usize,
     model: Arc<dyn Model>,
     fixed: Vec<(Target, f64)>,
@@ -57,7 +57,7 @@ impl Machine {
         Ok(machine)
     }
 
-    /// The same machine, which begins elsewhere where a log does not say.
+    /// Returns the same machine with another initial state for logs that give none.
     #[must_use]
     pub(crate) fn beginning_at(&self, home: Keyframe) -> Self {
         let mut plant = Plant::clone(&self.plant);
@@ -68,7 +68,7 @@ impl Machine {
         }
     }
 
-    /// The same machine with half the time step.
+    /// Returns the same machine with half the time step.
     ///
     /// # Errors
     /// As [`Machine::new`].
@@ -86,7 +86,7 @@ impl Machine {
         Ok(home.map_or(finer.clone(), |home| finer.beginning_at(home.clone())))
     }
 
-    /// The model with more effects.
+    /// Returns the model with further effects.
     ///
     /// # Errors
     /// As [`Refined::new`].
@@ -97,7 +97,7 @@ impl Machine {
         Ok(self.refined(more)?)
     }
 
-    /// The same, refined by nothing where there are none.
+    /// Returns the model with further effects as a [`Refined`] one, even if nothing is refined.
     ///
     /// # Errors
     /// As [`Refined::new`].
@@ -107,7 +107,7 @@ impl Machine {
         Refined::new(&*self.backend, model, plant, &self.fixed, &effects)
     }
 
-    /// Effects that the study's model has already.
+    /// Returns the effects that the study's model has already.
     #[must_use]
     pub fn given_effects(&self) -> &[EffectSpec] {
         &self.effects

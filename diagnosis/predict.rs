@@ -1,4 +1,4 @@
-//! Open-loop rollouts of logs in a model: many parameter values, all episodes, one batch.
+//! Open-loop rollouts of logs in a model: many parameter values and all episodes in one batch.
 
 use asid_core::layout::{JointKind, Layout, Recording};
 use asid_core::simulator::{BatchConfig, Control, Rollout, Simulator};
@@ -19,8 +19,10 @@ pub struct State {
 }
 
 impl State {
-    /// Moves it along a coordinate: of the `nv` positions (`< nv`), then of the `nv` velocities. Orientations turn about the body's
-    /// own axes.
+    /// Moves the state along a coordinate: one of the `nv` positions (`< nv`), or one of the `nv`
+    /// velocities after them.
+    ///
+    /// Orientations rotate about the body's own axes.
     pub fn shift(&mut self, layout: &Layout, coordinate: usize, by: f64) {
         if coordinate >= layout.nv {
             self.qvel[coordinate - layout.nv] += by;
@@ -53,16 +55,16 @@ impl State {
     }
 }
 
-/// Values of all parameters, and the state each episode starts from.
+/// Values of all parameters, and the initial state of each episode.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// Values, in the parameters' units.
     pub theta: Vec<f64>,
-    /// Starts, one an episode; further ones are of no matter.
+    /// Initial states, one per episode; further ones are ignored.
     pub starts: Vec<State>,
 }
 
-/// Episodes that are rolled out together: the same physics steps a frame, about as long.
+/// Episodes that are rolled out together: equal physics steps per frame, and similar lengths.
 struct Group {
     episodes: Vec<usize>,
     frames: usize,
@@ -83,8 +85,8 @@ pub struct Predictor<'a> {
 }
 
 impl<'a> Predictor<'a> {
-    /// Makes a batch of `model` for the logs, whose unknowns are `parameters` and which takes
-    /// `capacity` points at once.
+    /// Makes a batch of `model` for the logs, with the unknowns `parameters`, that takes `capacity`
+    /// points at once.
     ///
     /// # Errors
     /// When the engine cannot set a target or does not know a sensor.
@@ -122,13 +124,13 @@ impl<'a> Predictor<'a> {
         self.logs
     }
 
-    /// Which residuals have a reading behind them.
+    /// Returns which residuals have a reading.
     #[must_use]
     pub fn present(&self) -> &[bool] {
         &self.present
     }
 
-    /// Predicted readings at some points: for each point, for each episode `rows x width`.
+    /// Predicts the readings at some points: `rows x width` for each episode of each point.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -194,9 +196,10 @@ impl<'a> Predictor<'a> {
         Ok(())
     }
 
-    /// Residuals `(logged - predicted) / noise` at some points, one vector a point over all
-    /// episodes, rows and entries; 0 where a reading is missing, infinite where the
-    /// simulation diverged.
+    /// Computes the residuals `(logged - predicted) / noise` at some points, one vector per point
+    /// over all episodes, rows and entries.
+    ///
+    /// They are 0 where a reading is missing, and infinite where the simulation diverged.
     ///
     /// # Errors
     /// As [`Predictor::readings`].
@@ -227,14 +230,15 @@ impl<'a> Predictor<'a> {
     }
 }
 
-/// Sorts episodes into groups, and repeats their commands for every point of a batch.
+/// Groups the episodes, and repeats their commands for every point of a batch.
 fn groups(logs: &Logs, nu: usize, capacity: usize) -> Vec<Group> {
     let mut order: Vec<usize> = (0..logs.episodes.len()).collect();
     let plan = |e: usize| &logs.episodes[e].plan;
     order.sort_by_key(|&e| (plan(e).substeps, plan(e).frames));
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for e in order {
-        // Within a fifth of the longest little is wasted.
+        // The longest of a group has at most 6/5 of the frames of the shortest, so that little is
+        // wasted.
         let fits = groups.last().and_then(|g| g.first()).is_some_and(|&first| {
             plan(first).substeps == plan(e).substeps && 5 * plan(e).frames <= 6 * plan(first).frames
         });

@@ -1,7 +1,7 @@
-//! What the model does in the logs' episodes: states, forces of drives, contacts.
+//! What the model does in the logs' episodes: states, drive forces, contacts.
 //!
-//! Logs show some sensors; candidates and regimes need the whole state, which the model
-//! replays from the same commands.
+//! Logs contain some sensors only. Candidates and regimes of motion need the whole state, which the
+//! model replays from the same commands.
 
 mod contact;
 mod envelope;
@@ -17,23 +17,23 @@ use crate::predict::Point;
 use contact::{contact_channel, look_for_touches, pairs_of};
 use envelope::spreads;
 
-/// States of all episodes at the ends of their frames.
+/// States of all episodes at their rows.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     /// Names of the sensors that the logs have.
     pub sensors: Vec<String>,
-    /// How many logs there are: an episode may be a part of one.
+    /// Number of logs; an episode may be a part of one.
     pub logs: usize,
-    /// One an episode.
+    /// One path per episode.
     pub episodes: Vec<Path>,
     /// Pairs of bodies that can touch.
     pub pairs: Vec<[usize; 2]>,
-    /// Whether each pair does, after any physics step of any episode.
+    /// Whether each pair touches after any physics step of any episode.
     touched: Vec<bool>,
     readings: Vec<(String, f64)>,
 }
 
-/// One episode.
+/// States, commands and contacts of one episode.
 #[derive(Clone, Debug)]
 pub struct Path {
     /// Positions, `rows x nq`.
@@ -42,12 +42,12 @@ pub struct Path {
     pub qvel: Vec<f64>,
     /// Commands, `rows x nu`.
     pub ctrl: Vec<f64>,
-    /// Normal forces, N, `rows x pairs`.
+    /// Normal forces of the pairs, N, `rows x pairs`.
     pub contact: Vec<f64>,
 }
 
 impl Trajectory {
-    /// Replays all episodes at a point and records states and contacts at the rows' times.
+    /// Replays all episodes at a point, and records states and contacts at the times of the rows.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -117,8 +117,9 @@ impl Trajectory {
         })
     }
 
-    /// Of states that are known (`rows x (nq + nv)` each, with the episode and its rows), and the contacts that the model has
-    /// there.
+    /// Makes a trajectory of known states, with the contacts that the model has there.
+    ///
+    /// `states` has `rows x (nq + nv)` values for each part of a log, `rows` its episode and rows.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -186,7 +187,8 @@ impl Trajectory {
     }
 }
 
-/// Positions `qpos` at the rows of an episode (`rows x nq`), replayed from the first start of `point`.
+/// Returns the positions at the rows of an episode (`rows x nq`), replayed from the first initial
+/// state of `point`.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
