@@ -1,8 +1,9 @@
-//! A look at laws by open-loop replays.
+//! Comparison of laws by open-loop replays.
 //!
-//! A rotor that flies from one end of its gap to the other acts on its joint in a few rows and by what it has kept until then; columns about a
-//! trajectory that no gap has made hardly show it, and none tells how wide the gap is. A friction that holds a joint shows what it is as large
-//! as, and no more. A replay tells: it begins with the log and goes its own way.
+//! A rotor that flies from one end of its gap to the other acts on its joint in few rows, and
+//! through its memory of earlier ones. Columns about a trajectory without a gap hardly show it, and
+//! none shows the width of the gap. A friction that holds a joint shows only the force that it
+//! balances. A replay shows more, because it starts at the log and then runs freely.
 
 use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
@@ -16,25 +17,30 @@ use super::screening::Look;
 use super::set::Set;
 use super::tolerances::Tolerances;
 
-/// Candidates with a slope at their null that are replayed, at most, and as many without: each takes some replays of all logs.
+/// Most candidates with a derivative at their null that are replayed, and most without: each takes
+/// several replays of all logs.
 const REPLAYED: usize = 8;
-/// Parts of the way that a slope goes at which replays are asked: a slope over- or underrates what is large.
+/// Fractions of the value that a derivative predicts at which laws are replayed: a derivative over-
+/// or underestimates large values.
 const PARTS: [f64; 5] = [0.25, 0.5, 0.75, 1.0, 2.0];
-/// About the best of these, halvings of the distance to the next at which they are asked on both sides of it: what holds a joint does so from
-/// some value on, and nearly does just below.
+/// Halvings of the distance between fractions; after each, the best is replayed again on both
+/// sides.
+///
+/// A friction that holds a joint does so from some value on, and nearly does so just below.
 const HALVINGS: usize = 3;
-/// Sets that are fitted to replays, and of these to the missing force, at most.
+/// Most sets that are fitted to replays, and then to the missing force.
 const TRIED: usize = 3;
-/// Difference of a study's parameter that slopes of replays are taken over, in deviations of its prior.
+/// Step of a study's parameter for derivatives of replays, in deviations of its prior.
 pub(super) const STEP: f64 = 0.02;
 
-/// What replays tell of the study's parameters, to first order.
+/// Derivatives of replays with respect to the study's parameters.
 pub(super) struct Given {
     slopes: DMatrix<f64>,
 }
 
 impl Given {
-    /// Mean square that is left of residuals once the parameters have made up for what they can.
+    /// Mean square of residuals after the parameters have made up for what they can, to first
+    /// order.
     pub(super) fn left(&self, residuals: Vec<f64>) -> f64 {
         let r = DVector::from_vec(residuals);
         if self.slopes.ncols() == 0 || self.slopes.nrows() != r.len() {
@@ -42,19 +48,19 @@ impl Given {
         }
         let gram = self.slopes.tr_mul(&self.slopes);
         let moment = self.slopes.tr_mul(&r);
-        // Of what tells nothing there is nothing to take out.
+        // Parameters that change no residual have nothing to remove.
         let taken = gram.svd(true, true).solve(&moment, f64::EPSILON.sqrt());
         let taken = taken.map_or(0.0, |x| x.dot(&moment));
         (r.norm_squared() - taken).max(0.0)
     }
 
-    /// Excess power that is left of residuals then.
+    /// Excess power of residuals after that.
     pub(super) fn excess(&self, residuals: Vec<f64>) -> f64 {
         excess(self.left(residuals))
     }
 }
 
-/// Excess power over that of the noise; infinite where it is no number.
+/// Excess power over that of the noise; infinite if the power is NaN.
 pub(super) fn excess(power: f64) -> f64 {
     if power.is_nan() {
         f64::INFINITY
@@ -64,9 +70,12 @@ pub(super) fn excess(power: f64) -> f64 {
 }
 
 impl Upon<'_> {
-    /// Sets that were `fitted` to the end, best first, and those single laws with which replays leave less than half of what they leave with the
-    /// best of these and without any, by themselves and beside what an ordinary machine has of everything. Upon no effect, where the best leaves
-    /// a gap of replays.
+    /// Adds to the sets that were `fitted` to the end the single laws that close most of the gap in
+    /// replays; best first.
+    ///
+    /// These laws leave less than half of what replays leave with the best of these sets, and less
+    /// than half of what they leave without effects. Each is added by itself and with tolerances.
+    /// This is done only upon the model without effects, if the best set leaves a gap of replays.
     pub(super) fn with_laws_by_replays(
         &self,
         fitted: Vec<Set>,
@@ -110,16 +119,20 @@ impl Upon<'_> {
         Ok(self.in_order(sets))
     }
 
-    /// Candidates of a set that are named.
+    /// Named candidates of a set.
     fn named_in(&self, set: &Set) -> Vec<usize> {
         let all = set.candidates.iter().copied();
         all.filter(|&c| !self.candidates[c].is_tolerance).collect()
     }
 
-    /// Fits a set once more about the replay that was found of its law, whose values it gives a prior of where they may lie by that: the missing force has
-    /// led them elsewhere, where replays leave more than twice as much. A drive that hardly moves its joint against a friction of 0.93 of its force is, to the
-    /// missing force, much like one that does not at 0.99; where the joint has gone to by and by is not. Leaves the set as it is where that closes no more
-    /// than half of the gap between the two.
+    /// Refits a set about the replay that was found for its law, with a prior of the law's values
+    /// from the replays.
+    ///
+    /// This is for a fit to the missing force that has moved the values to where replays leave more
+    /// than twice as much. A drive that hardly moves its joint against a friction of 0.93 of its
+    /// force is an example. Its missing force is much like that of a drive that does not move at
+    /// all, at 0.99. Where the joint goes over time is different. The new fit replaces the set only
+    /// if it exceeds the base by the threshold and leaves less than half of what the set leaves.
     fn tell(&self, set: &mut Set, replayed: &Set) -> Result<()> {
         let mut told = set.clone();
         let (fitted, by) = (&mut told.fitted, &replayed.fitted);
@@ -146,7 +159,8 @@ impl Upon<'_> {
         Ok(())
     }
 
-    /// The single laws that lead a screening, each where replays leave least, the least first.
+    /// The single laws that lead a screening, each at the values whose replays leave least, in
+    /// ascending order of what they leave.
     fn replayed_laws(&self, look: &Look, stands: f64) -> Result<Vec<Set>> {
         let given = self.given(self.open_loop.residuals)?;
         let singles = |without_slope: bool| {
@@ -165,7 +179,8 @@ impl Upon<'_> {
         Ok(laws.into_iter().map(|(_, set)| set).collect())
     }
 
-    /// The set of some with which replays leave least, after that; `None` where there was no time for any.
+    /// The set whose replays leave least, with what they leave; `None` if there was no time for
+    /// any.
     fn nearest(&self, sets: Vec<Set>, given: &Given) -> Result<Option<(f64, Set)>> {
         let mut nearest: Option<(f64, Set)> = None;
         for set in sets {
@@ -180,8 +195,10 @@ impl Upon<'_> {
         Ok(nearest)
     }
 
-    /// A law of a screening with its values at that part of the way that its slope goes at which replays leave least, after that; to a finer
-    /// part where they leave less than what `stands` leaves.
+    /// A law of a screening at the fraction of its predicted values whose replays leave least, with
+    /// what they leave.
+    ///
+    /// The fraction is refined if replays then leave less than `stands`.
     fn along(&self, law: Set, (given, stands): (&Given, f64)) -> Result<Option<(f64, Set)>> {
         let mut best: Option<(f64, f64)> = None;
         let look = |part: f64, best: &mut Option<(f64, f64)>| -> Result<()> {
@@ -212,7 +229,7 @@ impl Upon<'_> {
         Ok(best.map(|(left, part)| (left, self.at(&law, part))))
     }
 
-    /// The base with a law where a screening has it and at each of its start values.
+    /// The base with a law at its screened values, and at each of its start values.
     fn starts(&self, look: &Look, law: &Screened) -> Vec<Set> {
         let forms = &look.columns.forms;
         let own = forms[law.forms[0]].candidate;
@@ -229,7 +246,7 @@ impl Upon<'_> {
             .collect()
     }
 
-    /// Slopes of `residuals` of replays of the base in the values that it fits.
+    /// Derivatives of `residuals` of replays of the base with respect to its fitted values.
     pub(super) fn given(&self, residuals: &dyn Fn(&Set) -> Result<Vec<f64>>) -> Result<Given> {
         let here = DVector::from_vec(residuals(self.base)?);
         let hypothesis = &self.base.fitted.hypothesis;
@@ -262,7 +279,8 @@ impl Upon<'_> {
 mod tests {
     use super::*;
 
-    /// By hand: of (3, 4, 0) a slope along the first axis takes 3, and one that does nothing takes nothing.
+    /// By hand: from (3, 4, 0) a derivative along the first axis removes 3, and a zero one removes
+    /// nothing.
     #[test]
     fn the_studys_parameters_take_their_share_of_residuals() {
         let left = |columns: &[f64]| {

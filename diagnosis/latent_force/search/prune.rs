@@ -1,4 +1,4 @@
-//! A set without those of its members that do nothing.
+//! Removal of the members of a set that have no effect in it.
 
 use asid_core::{Progress, Result};
 use asid_effects::Start;
@@ -11,13 +11,17 @@ use crate::settings::Breadth;
 
 use super::set::{IDLE, Set, without};
 
-/// Evidence, natural logarithm, that a set may lose when what counts as nothing is left out.
+/// Evidence, in nats, that a set may lose when insignificant members are removed.
 const IDLE_LOSS: f64 = 1.0;
-/// Size, relative to the largest of the same law, below which a member of a group may stand in for something else: a law that joints
-/// have in common is not much smaller at one of them, unless it makes up for its share of what is missing.
+/// Size, relative to the largest of the same law, below which a member of a group may stand in for
+/// something else.
+///
+/// A law that joints share is not much smaller at one of them, unless that member makes up for its
+/// share of what is missing.
 const SLIGHT: f64 = 1.0 / 3.0;
 
-/// What a member of a set does: by how many deviations it is off its null values, and by how much.
+/// What a member of a set contributes: its distance from its null, in posterior deviations and in
+/// its own unit.
 struct Deed {
     candidate: usize,
     law: String,
@@ -25,7 +29,7 @@ struct Deed {
     size: f64,
 }
 
-/// What each member of a set does; those that have no size are left out.
+/// What each member of a set contributes; members without a size are left out.
 fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
     let fitted = &set.fitted;
     let free = fitted.hypothesis.free();
@@ -38,7 +42,8 @@ fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
         if candidates[c].is_tolerance {
             continue;
         }
-        // A speed at which a law changes is no size of it; a delay, which no slope is taken in, is.
+        // The speed at which a law changes is no measure of its size. A delay, which has no
+        // derivative, is one.
         let all_of = candidates[c].parameters();
         let has_slopes = all_of.iter().any(|p| p.start == Start::Slope);
         let sizes = range.clone().filter_map(|i| {
@@ -65,9 +70,11 @@ fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
     all
 }
 
-/// A set without the members that do nothing in it: those of a group that are as the model has them or next to it, and those
-/// that a later effect has taken the place of. A slight member of a group must make up for the share of what was missing `at_first`
-/// that any further effect must.
+/// Removes the members of a set that have no effect in it: members of a group at or near their
+/// null, and members that a later effect has replaced.
+///
+/// A slight member of a group stays only if it makes up for the share of what was missing
+/// `at_first` that any further effect must.
 pub(super) fn pruned(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -111,12 +118,15 @@ pub(super) fn pruned(
     Ok(set)
 }
 
-/// Whether a set makes up for as much as a further name must of what the first one, without the name, leaves.
+/// Whether the second set makes up for as much of what the first, without the name, leaves as a
+/// further name must.
 pub(super) type Counts<'c> = dyn Fn(&Set, &Set) -> Result<bool> + 'c;
 
-/// A set in which several names were put upon a base at once, without those that one name after the other would not have brought in: each
-/// must raise the evidence by the `threshold`, and make up for what `counts`. What is left is one of the `others` that were fitted, where it is
-/// among them.
+/// Removes the names of a set that adding one name after the other would not have included, if
+/// several were added to a base at once.
+///
+/// Each name must raise the evidence by the `threshold` and pass `counts`. If the remaining set is
+/// among the `others` that were fitted, that fit is used.
 pub(super) fn earned(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -129,7 +139,7 @@ pub(super) fn earned(
     while set.names > base.names + 1 && !progress.is_stopped() {
         let added = set.candidates.iter().copied().filter(is_more);
         let change = |c: usize| change_without(candidates, &set, &[c]).unwrap_or(f64::NEG_INFINITY);
-        // What is missed least.
+        // The member whose removal costs least.
         let Some(out) = added.max_by(|a, b| change(*a).total_cmp(&change(*b))) else {
             break;
         };
@@ -150,8 +160,10 @@ pub(super) fn earned(
     Ok(set)
 }
 
-/// The same as [`pruned`] where there is no time to fit what is left: the values that stay take their means given that those that go are at their
-/// null values, and the evidence is the one by the densities there ([`at_null`]). Slight members stay.
+/// Prunes as [`pruned`] does if there is no time for another fit.
+///
+/// The remaining values take their means given that the removed ones are at their null values. The
+/// evidence follows from the densities there ([`at_null`]). Slight members stay.
 pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
     let idle: Vec<usize> = (deeds(candidates, &set).iter())
         .filter(|d| d.strength < IDLE)
@@ -187,7 +199,7 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
     smaller
 }
 
-/// Places of the values of some candidates of a set among those that are fitted.
+/// Positions of the values of some candidates of a set among its fitted values.
 fn values_of(candidates: &[Candidate], set: &Set, of: &[usize]) -> Vec<usize> {
     let free = set.fitted.hypothesis.free();
     let mut at = set.fitted.theta.len();
@@ -215,23 +227,27 @@ fn without_values(set: &Set, out: &[usize]) -> Option<(f64, DVector<f64>)> {
     at_null(&off, &fitted.covariance, &prior, out)
 }
 
-/// Change of the evidence of a set without some of its candidates, to first order; `None` where that is not known.
+/// Change of the evidence of a set without some of its candidates, to first order; `None` if it is
+/// not known.
 pub(super) fn change_without(candidates: &[Candidate], set: &Set, out: &[usize]) -> Option<f64> {
     let values = values_of(candidates, set, out);
     without_values(set, &values).map(|(gain, _)| gain)
 }
 
-/// Covariance of the values `stay` given those `out`; `None` where these are certain.
+/// Covariance of the values `stay` given those `out`; `None` if the latter are certain.
 fn conditional(covariance: &DMatrix<f64>, stay: &[usize], out: &[usize]) -> Option<DMatrix<f64>> {
     let block = |a: &[usize], b: &[usize]| covariance.select_rows(a).select_columns(b);
     let own = block(out, out).cholesky()?;
     Some(block(stay, stay) - block(stay, out) * own.solve(&block(out, stay)))
 }
 
-/// What it does to put some values of a normal posterior at the centers of their priors: the change of the evidence, which is the ratio of
-/// the posterior's density there and the prior's (Savage and Dickey 1971), and the change of each value. `off` are the
-/// posterior's means from the centers, `prior` the priors' deviations, `out` the places of those that go. `None` where the
-/// posterior has no density.
+/// Effect of fixing some values of a normal posterior at the centers of their priors: the change of
+/// the evidence, and the change of each value.
+///
+/// The change of the evidence is the logarithm of the ratio of posterior to prior density at the
+/// centers (Savage and Dickey 1971). `off` holds the distances of the posterior's means from the
+/// centers, `prior` the standard deviations of the priors, and `out` the positions of the fixed
+/// values. `None` if the posterior has no density.
 fn at_null(
     off: &DVector<f64>,
     covariance: &DMatrix<f64>,
@@ -251,8 +267,8 @@ fn at_null(
 mod tests {
     use super::*;
 
-    /// Logarithm of the marginal likelihood of `y = a x + e`, `e ~ N(0, 1)`, `x ~ N(0, s^2)`, less that of `x = 0`; the posterior's mean
-    /// and covariance.
+    /// Log marginal likelihood of `y = a x + e` less that of `x = 0`, with `e ~ N(0, 1)` and
+    /// `x ~ N(0, s^2)`; the posterior's mean and covariance.
     fn regression(
         a: &DMatrix<f64>,
         y: &DVector<f64>,

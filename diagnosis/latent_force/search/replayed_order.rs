@@ -1,11 +1,16 @@
-//! What a race begins with where bodies touch: what replays of whole logs say.
+//! Order of a race by replays of whole logs, where bodies touch.
 //!
-//! A slope at the null tells little of a law that is large: a friction that stops a foot is many times the friction that its slope was
-//! taken over, and by slopes it comes far behind other laws. Where a model lets go of what the machine holds, all laws that keep it held come out alike by
-//! slopes. A replay with the right one lands on the log. So the sets that lead by slopes are replayed at the values that these promise, the better half of them at
-//! others along the same direction too (successive halving, Jamieson and Talwalkar 2016), and these are fitted to the replays together with the study's
-//! parameters, which stand in for what a model lacks and have to let go of it. Those that leave least are fitted before all others, from
-//! there. Evidence decides as ever; but it is asked of what closes the gap.
+//! A derivative at the null says little about a law that is large. A friction that stops a foot is
+//! many times the friction over which its derivative was taken, and derivatives rank it far behind
+//! other laws. If the model drops what the machine holds, derivatives rank all laws that keep it
+//! held alike. A replay with the right law matches the log.
+//!
+//! So the sets that derivatives rank first are replayed at their predicted values. The better half
+//! is replayed at further points of the same direction too (successive halving, Jamieson and
+//! Talwalkar 2016). This half is then fitted to the replays, together with the study's parameters:
+//! these stand in for what a model lacks, and must be free to move back. The sets that leave least
+//! are raced before all others, from the values found. The evidence decides as always, but sets
+//! that close the gap come first.
 
 use asid_core::Result;
 
@@ -20,51 +25,66 @@ use super::round::Upon;
 use super::screening::Look;
 use super::set::Set;
 
-/// Physics steps that such replays take, at most: about what a screening of a machine with contacts takes.
+/// Most physics steps of these replays: about as many as a screening of a machine with contacts
+/// takes.
 const STEPS: usize = 1_600_000;
-/// Replays of a fit, about.
+/// Approximate number of replays that a fit takes.
 const OF_FIT: f64 = 12.0;
-/// Further replays of each of the better half.
+/// Further replays of each set of the better half.
 const FURTHER: usize = 2;
-/// Values of a set, at most, that are fitted by themselves: a force has three. Of more only how far all of them go is fitted, which is no bound of what they could leave.
+/// Most values of a set that are fitted individually: a force has three.
+///
+/// Of more values only the common distance is fitted, which is no bound of what they could leave.
 const FEW: usize = 3;
-/// Difference of a value, or of the part of the way, that slopes of replays are taken over, relative to it.
+/// Step of a value, or of a fraction of the way, for derivatives of replays, relative to it.
 const PART_STEP: f64 = 0.02;
-/// Starts that the logs tell by themselves are replayed from unless those that the base has smoothed leave so much less, as power: these make a
-/// model that lacks something look better than it is, but where nothing tells how fast a ball spins they are all there is.
+/// Smoothed initial states replace the logged ones only if their replays leave less than this share
+/// of the power.
+///
+/// Smoothed initial states make a model that lacks something look better than it is. But if nothing
+/// shows how fast a ball spins, they are all there is.
 const SMOOTHED: f64 = 0.25;
-/// Excess power, relative to the least, up to which a set is one that a race begins with: a gap of 1.4 times the least.
+/// Excess power, relative to the least, up to which a set is among the first of a race: a gap of
+/// 1.4 times the least.
 const LEVEL: f64 = 2.0;
-/// Deviations of the mean square of readings that are noise alone by which one may exceed 1 by chance: 98 %.
+/// Standard deviations by which the mean square of readings that are noise alone may exceed 1 by
+/// chance: 98 %.
 const CHANCE: f64 = 2.0;
 
 /// Residuals of replays of a set.
 type Residuals<'r> = &'r dyn Fn(&Set) -> Result<Vec<f64>>;
 
-/// A set of a screening that was replayed.
+/// A replayed set of a screening.
 pub(super) struct Candidacy {
-    /// Place among those ranked.
+    /// Position in the ranking.
     pub(super) place: usize,
-    /// Where replays leave least, if that is not at the values that slopes promise.
+    /// The set at the values whose replays leave least, if these are not the predicted ones.
     pub(super) elsewhere: Option<Set>,
-    /// Whether they leave most of the gap there, or, of few values, far more than what leaves no more than chance does.
+    /// Whether replays leave most of the gap there.
+    ///
+    /// Sets of few values count too if they leave far more than the least and another set leaves no
+    /// more than chance does.
     pub(super) is_behind: bool,
 }
 
-/// What replays say of the sets of a screening.
+/// What replays show of the sets of a screening.
 #[derive(Default)]
 pub(super) struct Replayed {
-    /// Those that were replayed: first those that a race begins with, then the others, those that leave least first.
+    /// The replayed sets: first those that a race begins with, then the others in ascending order
+    /// of what they leave.
     pub(super) sets: Vec<Candidacy>,
-    /// How many a race begins with.
+    /// Number of sets that a race begins with.
     pub(super) first: usize,
-    /// Whether one of these leaves no more than chance does.
+    /// Whether a replayed set leaves no more than chance does.
     pub(super) closes: bool,
 }
 
 impl Upon<'_> {
-    /// The single names that lead a screening by what replays leave with them. A race begins with those of them that close most of the gap that the base leaves,
-    /// and leave about the least, the one of fewest values first. None where there are no segments, or hardly a gap.
+    /// Replays the single names that lead a screening, and orders them.
+    ///
+    /// A race begins with those that close most of the gap that the base leaves and leave about the
+    /// least, the one with the fewest values first. There are none without segments, or if there is
+    /// hardly a gap.
     pub(super) fn replayed(&self, look: &Look) -> Result<Replayed> {
         if !self.context.has_segments() {
             return Ok(Replayed::default());
@@ -113,7 +133,8 @@ impl Upon<'_> {
         })
     }
 
-    /// The single names that lead by slopes, replayed; those that leave least first.
+    /// The single names that derivatives rank first, replayed; in ascending order of what they
+    /// leave.
     fn lines(&self, look: &Look, (residuals, given): (Residuals<'_>, &Given)) -> Result<Vec<Line>> {
         let most = STEPS as f64 / self.open_loop.steps.max(1) as f64;
         let names = look.ranked.iter().enumerate();
@@ -124,7 +145,7 @@ impl Upon<'_> {
         let line = |(place, s)| Line::new(place, self.enlarged(look, s));
         let mut lines: Vec<Line> = names.map(line).collect();
         let n = lines.len();
-        // All of them where there are few.
+        // All of them if there are few.
         let better = n.div_ceil(2).max((most / (1.0 + of_better)) as usize);
         for line in &mut lines {
             self.replay(line, 1.0, (residuals, given))?;
@@ -149,7 +170,10 @@ impl Upon<'_> {
         Ok(lines)
     }
 
-    /// Replays a set at a part of its way, if there is time for it; beyond a bound of its values it leaves nothing that is finite.
+    /// Replays a set at a fraction of its way, if there is time for it.
+    ///
+    /// A fraction whose values were replayed already, because they are at a bound, counts as
+    /// leaving infinitely much.
     fn replay(
         &self,
         line: &mut Line,
@@ -170,8 +194,10 @@ impl Upon<'_> {
         Ok(())
     }
 
-    /// Fits the values of a line and those of the base to replays; of a line of many values the part of its way that it goes. With the excess power that they
-    /// leave.
+    /// Fits the values of a line and those of the base to replays, and returns the excess power
+    /// that is left, with the set.
+    ///
+    /// Of a line with many values only the fraction of its way is fitted.
     fn fitted_along(&self, line: &Line, residuals: Residuals<'_>) -> Result<(f64, Set)> {
         let begin = self.at(&line.set, line.part());
         let unknowns = &begin.fitted.hypothesis.unknowns;
@@ -217,7 +243,7 @@ impl Upon<'_> {
     }
 }
 
-/// Places of the free values that a set adds to a base.
+/// Positions of the free values that a set adds to a base.
 fn own_values(set: &Set, base: &Set) -> Vec<usize> {
     let all = set.fitted.hypothesis.free().into_iter();
     all.filter(|&i| i >= base.fitted.theta.len()).collect()

@@ -1,4 +1,4 @@
-//! Sets of effects, fitted: made larger, smaller, and fitted on.
+//! Fitted sets of effects: enlarged, reduced, and refitted.
 
 use std::ops::Range;
 
@@ -13,22 +13,23 @@ use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
-/// Deviations of the evidence about its plateaus by which a further effect must rise above the threshold: 95 %.
+/// Standard deviations of the evidence's scatter that a further effect must exceed in addition to
+/// the threshold: 95 %.
 const WANDER: f64 = 2.0;
 
-/// A set of effects, fitted.
+/// A fitted set of effects.
 #[derive(Clone, Debug)]
 pub struct Set {
     /// Candidates, in the order in which they were added.
     pub candidates: Vec<usize>,
-    /// The model.
+    /// The fitted model.
     pub fitted: Fitted,
-    /// How many named things it is: a group counts once.
+    /// Number of names; a group counts once.
     pub names: usize,
 }
 
 impl Set {
-    /// No effect.
+    /// The set without effects.
     pub(in crate::latent_force) fn without_effects(fitted: &Fitted) -> Self {
         Self {
             candidates: Vec::new(),
@@ -37,19 +38,22 @@ impl Set {
         }
     }
 
-    /// Whether its evidence exceeds another one's by a threshold, and by what both scatter by.
+    /// Whether its evidence exceeds that of another set by a threshold plus the scatter of both.
     pub(super) fn rises_above(&self, other: &Self, threshold: f64) -> bool {
         let unsure = WANDER * self.fitted.wander.hypot(other.fitted.wander);
         self.fitted.evidence - other.fitted.evidence > threshold + unsure
     }
 
-    /// Whether evidence does not tell it from another set that is ahead: by no more than what both scatter by, or than what counts as a `rise`.
+    /// Whether the evidence does not separate it from another set that is ahead.
+    ///
+    /// This holds if the difference is at most the scatter of both, or at most what counts as a
+    /// `rise`.
     pub(super) fn is_level_with(&self, ahead: &Self, rise: f64) -> bool {
         let unsure = WANDER * self.fitted.wander.hypot(ahead.fitted.wander);
         ahead.fitted.evidence - self.fitted.evidence <= unsure.max(rise)
     }
 
-    /// Fits it on from where it stands, to some extent.
+    /// Continues its fit from its present state, to the given extent.
     pub(super) fn fit<'p>(
         &mut self,
         context: &Context<'_>,
@@ -67,8 +71,12 @@ impl Set {
     }
 }
 
-/// Puts the simplest of some sets, the best first, before those that evidence does not tell it from: of a tilt and a constant force on a single
-/// ball, which are the same to the ball, that of fewer values. It names no more than they do.
+/// Moves the simplest of the sets that the evidence does not separate from the first one to the
+/// front.
+///
+/// The sets come in descending order of evidence. The simplest set has the fewest values, and no
+/// more names than the first. For example, a tilt and a constant force are equivalent for a single
+/// ball, and the one with fewer values comes first.
 pub(super) fn simplest_first(sets: &mut [Set], rise: f64) {
     let Some(first) = sets.first() else { return };
     let values = |s: &Set| s.fitted.hypothesis.free().len();
@@ -79,7 +87,7 @@ pub(super) fn simplest_first(sets: &mut [Set], rise: f64) {
     }
 }
 
-/// The model with some more candidates, and values to begin with.
+/// The model with further candidates, and the values to begin with.
 pub(super) fn with(
     base: &Fitted,
     columns: &Columns,
@@ -104,9 +112,12 @@ pub(super) fn with(
     (hypothesis, theta, added)
 }
 
-/// A set fitted once more from where another one has come to: from its trajectory, its noise, its starts of segments and its values of what both
-/// have. A fit finds one of the places where evidence no longer rises, and what another set owes to a better one is no evidence for its
-/// effects: a force that a model could make up for, but that its noise has taken for chance; one of the many ways to begin a segment.
+/// Refits a set from the result of another one: from its trajectory, its noise, its initial states
+/// of segments and its values of what both have.
+///
+/// A fit finds one of several local maxima of the evidence. If another set owes its evidence to a
+/// better maximum, that is no evidence for its effects. For example, the noise may have absorbed a
+/// force that the model could explain. A segment may also begin in one of many ways.
 pub(super) fn from_fit_of(
     context: &Context<'_>,
     (set, other): (&Set, &Set),
@@ -121,7 +132,7 @@ pub(super) fn from_fit_of(
     Ok(again)
 }
 
-/// Gives the free values of a model those that another one has of them.
+/// Copies to the free values of a model those that another model has of them.
 pub(super) fn shared_values(fitted: &mut Fitted, other: &Fitted) {
     let theirs = &other.hypothesis.unknowns;
     let own = fitted.hypothesis.unknowns.iter();
@@ -133,13 +144,13 @@ pub(super) fn shared_values(fitted: &mut Fitted, other: &Fitted) {
     }
 }
 
-/// Deviations from null up to which a value counts as nothing.
+/// Posterior deviations from the null up to which a value counts as insignificant.
 pub(super) const IDLE: f64 = 2.0;
 
-/// What a person is told who reads of a set that has no name.
+/// Name that users see for tolerances, which name no effect.
 pub(super) const TOLERANCES: &str = "tolerances";
 
-/// Labels of some candidates, and whether tolerances are among them.
+/// Labels of some candidates, followed by that of tolerances if these are among them.
 #[must_use]
 pub fn name_of(candidates: &[Candidate], set: &[usize]) -> String {
     let mut names = grouped(&labels_of(candidates, set));
@@ -149,7 +160,7 @@ pub fn name_of(candidates: &[Candidate], set: &[usize]) -> String {
     names.join(" + ")
 }
 
-/// Labels of those of some candidates that are named.
+/// Labels of the named ones of some candidates.
 #[must_use]
 pub fn labels_of(candidates: &[Candidate], set: &[usize]) -> Vec<String> {
     let named = set.iter().map(|&c| &candidates[c]);
@@ -166,12 +177,12 @@ pub(super) fn refined_by(candidates: &[Candidate], finer: usize) -> Option<usize
         .position(|c| c.spec.site == fine.spec.site && simpler.contains(&&*c.spec.name))
 }
 
-/// Whether a candidate's turn has come: a refinement's once the simpler law is named.
+/// Whether a candidate may be tried: a refinement only once the simpler law is named.
 pub(super) fn is_due(candidates: &[Candidate], set: &Set, candidate: usize) -> bool {
     refined_by(candidates, candidate).is_none_or(|simpler| set.candidates.contains(&simpler))
 }
 
-/// Places of the values of a set's candidate among all values that it is fitted with.
+/// Positions of the values of a set's candidate among all values of its model.
 fn values_of(set: &Set, candidates: &[Candidate], which: usize) -> Option<Range<usize>> {
     let place = set.candidates.iter().position(|&c| c == which)?;
     let lengths =
@@ -181,7 +192,8 @@ fn values_of(set: &Set, candidates: &[Candidate], which: usize) -> Option<Range<
     Some(first..first + candidates[which].parameters().len())
 }
 
-/// A set in which a finer law, that was put beside the simpler one, takes its place and does what that did.
+/// Replaces the simpler law of a set by a finer law that was added beside it, and which takes over
+/// its values.
 pub(super) fn refined(set: &Set, candidates: &[Candidate], [finer, simpler]: [usize; 2]) -> Set {
     let mut set = set.clone();
     let places = [finer, simpler].map(|c| values_of(&set, candidates, c));
@@ -204,7 +216,9 @@ pub(super) fn refined(set: &Set, candidates: &[Candidate], [finer, simpler]: [us
     without(&set, candidates, simpler)
 }
 
-/// A set without one of its candidates, its other values as they are. A law that it then names nowhere is a name less.
+/// Removes a candidate from a set; its other values stay as they are.
+///
+/// If the law is then named nowhere, the set has one name fewer.
 pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     let mut set = set.clone();
     let place = set.candidates.iter().position(|&c| c == out);

@@ -1,8 +1,9 @@
-//! What an ordinary machine has of everything: masses, lengths, frictions and delays within their tolerances, all at once.
+//! All tolerances of an ordinary machine at once: masses, lengths, frictions and delays.
 //!
-//! A machine differs from its model in many small things, and one law that is none of them may make up for many: a lag at each
-//! drive for delays, frictions and a compliance. Here all of them together are a rival of every name: each with a normal prior as wide as
-//! its tolerance, so that what each does is paid for by the evidence alone. They are fitted, and never named.
+//! A machine differs from its model in many small things. One law that is none of them may make up
+//! for many, as a lag at each drive does for delays, frictions and a compliance. So all tolerances
+//! together are a rival of every name. Each has a normal prior as wide as its tolerance, so that
+//! the evidence alone pays for it. They are fitted, and never named.
 
 mod names;
 
@@ -20,49 +21,53 @@ use crate::latent_force::smoother::Regression;
 use super::has_tolerances;
 use super::set::Set;
 
-/// Deviations that a tolerance is taken as.
+/// Standard deviations that a tolerance is wide.
 const DEVIATIONS: f64 = 3.0;
-/// Information of a value, in deviations of its tolerance, up to which the logs tell nothing of it: its evidence is half of that.
+/// Least information about a value, in squared deviations of its tolerance, below which it is not
+/// fitted: its evidence is about half of that.
 const LEAST_INFORMATION: f64 = 0.1;
-/// Most names that tolerances are compared with in a screening: what the first three do not make up for is many small things.
+/// Most names that tolerances are compared with in a screening: what the first three do not make up
+/// for is many small things.
 const NAMES: usize = 3;
-/// Sets that lead a screening and are tried as such a name.
+/// Leading sets of a screening that are tried as such a name.
 const LEADING: usize = 60;
 
-/// One thing within its tolerance: a candidate, the values to begin with, and the deviation of each; 0 where it is not fitted.
+/// One tolerance: a candidate, its values, and the prior deviation of each value; 0 for one that is
+/// not fitted.
 #[derive(Clone, Debug)]
 struct Member {
     candidate: usize,
-    /// Where nothing is off, and where the regression has them.
+    /// Values at the null, and those of the regression.
     begin: Vec<f64>,
     values: Vec<f64>,
     deviations: Vec<f64>,
-    /// The like candidate that can be named, and what its values are then.
+    /// The candidate of the same effect that can be named, with its unknowns.
     named: (usize, Vec<Unknown>),
 }
 
-/// All that the logs can tell of an ordinary machine's tolerances upon a model, to first order.
+/// What the logs show of an ordinary machine's tolerances upon a model, to first order.
 #[derive(Clone, Debug)]
 pub struct Tolerances {
-    /// Evidence over the model, natural logarithm.
+    /// Evidence over the model, in nats.
     pub(super) gain: f64,
     base: Vec<f64>,
     members: Vec<Member>,
 }
 
-/// Deviation of a value that is within a range about its null.
+/// Standard deviation of a value whose tolerance is a range about its null.
 fn deviation([low, high]: [f64; 2], null: f64) -> f64 {
     (null - low).abs().max((high - null).abs()) / DEVIATIONS
 }
 
-/// Of the coefficients of a model's own columns those of its values, as many as are `free`: after them comes that of the engine's own error,
-/// which moves none.
+/// The coefficients of a model's values: the first `free` of its own columns.
+///
+/// The column after them is that of the engine's own error, which changes no value.
 fn of_values(own: &[f64], free: usize) -> Vec<f64> {
     own[..free.min(own.len())].to_vec()
 }
 
 impl Member {
-    /// Puts it into a set with some values, which is not fitted then.
+    /// Adds it to a set with some values; the set is not refitted.
     fn join(&self, set: &mut Set, candidate: &Candidate, values: &[f64]) {
         let fitted = &mut set.fitted;
         fitted.hypothesis.specs.push(candidate.spec.clone());
@@ -72,7 +77,7 @@ impl Member {
         set.candidates.push(self.candidate);
     }
 
-    /// What its parameters are as unknowns of a fit.
+    /// Its parameters as unknowns of a fit.
     fn unknowns(&self, candidate: &Candidate) -> Vec<Unknown> {
         let own = candidate.unknowns().into_iter();
         own.zip(candidate.parameters())
@@ -90,8 +95,11 @@ impl Member {
 }
 
 impl Tolerances {
-    /// Of the candidates that stand for tolerances and are not in a set yet, by the columns of the like candidates that can be named: those
-    /// that are `open`, of which `columns` and the regressions of `scales` are. `None` where the logs tell nothing of them.
+    /// Tolerances of the candidates that are not in a set yet, by the columns of the nameable
+    /// candidates of the same effects.
+    ///
+    /// The nameable candidates are the `open` ones. `columns` and the regressions of `scales` are
+    /// theirs. `None` if the set has tolerances already, or if the logs show nothing of any.
     pub(super) fn of(
         (scales, columns): (&Scales, &Columns),
         open: &[usize],
@@ -102,7 +110,7 @@ impl Tolerances {
             return None;
         }
         let sharpest = scales.common.last()?;
-        // Column, deviation in those of its prior, bounds.
+        // Column, its deviation in units of its prior's, and bounds.
         let mut taken: Vec<(usize, f64, [f64; 2])> = Vec::new();
         let mut members = Vec::new();
         for (c, candidate) in candidates.iter().enumerate() {
@@ -169,8 +177,10 @@ impl Tolerances {
         })
     }
 
-    /// A set with all of them but those of what it names, its values moved as the screening says; not fitted yet. One that has some
-    /// already gets the others, and its values stay.
+    /// A set with all tolerances except those of effects that it names, and with its own values
+    /// moved by the screening; not fitted yet.
+    ///
+    /// A set that has some tolerances already gets the others, and its values stay as they are.
     pub(super) fn beside(&self, set: &Set, candidates: &[Candidate]) -> Set {
         if has_tolerances(candidates, set) {
             return self.begun_at_null(set, candidates);
@@ -185,8 +195,11 @@ impl Tolerances {
         self.joined(set, candidates, |member| &member.values)
     }
 
-    /// A set with all of them but those of what it names, each where nothing is off, and its own values as they are; not fitted yet. What the
-    /// screening says of them upon a trajectory of another model does not hold about the set's own.
+    /// A set with all tolerances except those of effects that it names, each at its null; its own
+    /// values stay as they are, and it is not fitted yet.
+    ///
+    /// Screened values that hold about the trajectory of another model do not hold about the set's
+    /// own.
     pub(super) fn begun_at_null(&self, set: &Set, candidates: &[Candidate]) -> Set {
         self.joined(set.clone(), candidates, |member| &member.begin)
     }
@@ -198,14 +211,15 @@ impl Tolerances {
         set
     }
 
-    /// Those that some candidates neither name nor hold.
+    /// The tolerances that some candidates neither name nor include.
     fn not_in<'m>(&'m self, held: &'m [usize]) -> impl Iterator<Item = &'m Member> {
         let is_in = |m: &&Member| held.contains(&m.named.0) || held.contains(&m.candidate);
         self.members.iter().filter(move |m| !is_in(m))
     }
 }
 
-/// Best evidence over the scales of some columns, each with another deviation of its prior, and their coefficients in these.
+/// Best evidence over the scales of some columns, each with its own deviation of the prior, and
+/// their coefficients in units of these.
 fn best(sums: &[Regression], columns: &Columns, all: &[(usize, f64, [f64; 2])]) -> (f64, Vec<f64>) {
     let n = all.len();
     let which: Vec<usize> = (0..n).collect();
@@ -233,8 +247,9 @@ fn best(sums: &[Regression], columns: &Columns, all: &[(usize, f64, [f64; 2])]) 
     best
 }
 
-/// Evidence of the best few names by one regression, less the price of each but the first: what a search upon the present model may come to,
-/// to first order.
+/// Evidence of the best few names by one regression, less the price of each but the first.
+///
+/// This estimates, to first order, what a search upon the present model may reach.
 pub(super) fn of_names(scales: &Scales, columns: &Columns, ranked: &[Screened], price: f64) -> f64 {
     let mut which: Vec<usize> = (0..columns.base).collect();
     let (none, _) = scales.best(columns, &which);
@@ -274,19 +289,19 @@ mod tests {
     #[test]
     fn a_range_is_three_deviations() {
         assert!((deviation([0.91, 1.09], 1.0) - 0.03).abs() < 1e-12);
-        // Of one side as well.
+        // A one-sided range as well.
         assert!((deviation([0.0, 0.0045], 0.0) - 0.0015).abs() < 1e-12);
         assert_eq!(deviation_within([0.2, 0.2], 0.0), 0.0);
     }
 
     #[test]
     fn the_engines_own_error_moves_no_value_of_an_effect_that_tolerances_come_beside() {
-        // A value of the study and the engine's error; beside a name the next value is the name's.
+        // A value of the study and the engine's error. Beside a name the next value is the name's.
         assert_eq!(of_values(&[0.3, 7.0], 1), [0.3]);
         assert_eq!(of_values(&[0.3], 1), [0.3]);
     }
 
-    /// Columns of one form whose second is idle.
+    /// Columns of one form; the second is unused.
     fn columns() -> Columns {
         Columns {
             linear: Vec::new(),
@@ -305,7 +320,8 @@ mod tests {
 
     #[test]
     fn a_pair_fitted_with_tolerances_gets_none_of_them_twice() {
-        // A dry friction and a bias (1, 2) with what an ordinary machine has of a delay (5): the bias has gone out of it.
+        // A dry friction (1) with a tolerance of a delay (5): a bias (2), named at once with the
+        // friction, has been removed from the set.
         let member = |candidate, named| Member {
             candidate,
             begin: Vec::new(),

@@ -1,7 +1,8 @@
-//! Twins of the set that stands: other names for what it does, which no fit has told from its own.
+//! Twins of the set that stands: sets of other names that no fit has separated from it.
 //!
-//! A servo's damping and the friction of its joint do the same while the drive keeps within its limit of force. A search goes on from one of the
-//! two, and what is then put beside that one, tolerances or a further name, would raise it above the other. A twin has the same beside it.
+//! A servo's damping and the friction of its joint are equivalent while the drive stays within its
+//! force limit. A search continues from one of the two. Whatever is then added to it, tolerances or
+//! a further name, would raise it above the other. A twin gets the same additions.
 
 use asid_core::Result;
 
@@ -14,11 +15,15 @@ use super::prior::{log_prior, worth};
 use super::set::{Set, without};
 use super::{Search, is_within};
 
-/// Twins that are fitted, at most.
+/// Most twins that are fitted.
 const MOST: usize = 2;
 
-/// What goes out of the `best` set and what comes in, where the set `ahead` of which it is made and an `other` one change places; `None` where it is
-/// not made of that one, or is no larger, or holds some of the other one already.
+/// The candidates of `best` to remove and those to insert, if `ahead` and `other` are exchanged in
+/// it.
+///
+/// `best` was built from `ahead`. `None` if `best` does not contain all of `ahead` or is no larger.
+/// Also `None` if `best` already contains some of what is to be inserted, or if nothing is removed
+/// or inserted.
 fn exchanged(best: &[usize], ahead: &[usize], other: &[usize]) -> Option<[Vec<usize>; 2]> {
     let not_in = |a: &[usize], b: &[usize]| -> Vec<usize> {
         let own = a.iter().filter(|c| !b.contains(c));
@@ -30,7 +35,7 @@ fn exchanged(best: &[usize], ahead: &[usize], other: &[usize]) -> Option<[Vec<us
     (is_part && is_new && !out.is_empty() && !into.is_empty()).then_some([out, into])
 }
 
-/// A set with a candidate of another set, at the values that it has there.
+/// Adds to a set a candidate of another set, with the values that it has there.
 fn with_that_of(set: &Set, other: &Set, candidates: &[Candidate], candidate: usize) -> Set {
     let mut set = set.clone();
     let Some(place) = other.candidates.iter().position(|&c| c == candidate) else {
@@ -53,7 +58,7 @@ fn with_that_of(set: &Set, other: &Set, candidates: &[Candidate], candidate: usi
 }
 
 impl Search<'_> {
-    /// Tolerances of a set that are of the same effects at the same sites as some candidates.
+    /// Tolerances of a set that belong to the same effects at the same sites as some candidates.
     fn within_tolerance(&self, set: &Set, some: &[usize]) -> Vec<usize> {
         let candidates = self.candidates;
         let labels: Vec<String> = some.iter().map(|&c| candidates[c].label()).collect();
@@ -62,9 +67,13 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Sets that a path has fitted and found behind its best one, with a candidate that is easily mistaken for one of that: fitted a little more from where the
-    /// best one has come to. A fit may be given up, or end, far from the values at which it would do the same; and of a tilt and a force that may
-    /// point anywhere, the force stands in for a part of what a further name makes up for later.
+    /// The best set of a path with one candidate replaced by one that is easily mistaken for it;
+    /// refitted.
+    ///
+    /// The new candidate is that of a set which the path has fitted and found behind the best one.
+    /// The fit of that set may have been given up, or have ended, far from the values at which the
+    /// two are equivalent. Of a tilt and a force of any direction, the force also absorbs a part of
+    /// what a further name explains later.
     fn mistaken(&self, path: &Path) -> Result<Vec<Set>> {
         let (context, best) = (self.context, &path.best);
         let mut again: Vec<Set> = Vec::new();
@@ -94,7 +103,7 @@ impl Search<'_> {
             let rest = without(best, self.candidates, *out);
             let mut set = with_that_of(&rest, other, self.candidates, *into);
             set.names = best.names;
-            // In segments only a long fit shows by how much its evidence scatters.
+            // In segments only a long fit shows the scatter of its evidence.
             let [little, whole] = self.breadth.rounds;
             let rounds = if context.has_segments() {
                 whole
@@ -110,8 +119,11 @@ impl Search<'_> {
         Ok(again)
     }
 
-    /// Adds the twins of the best set of a path to what its last round has fitted. One that is worth more, for its name is likelier, stands, or one of fewer
-    /// values that evidence does not tell from it; twins of it are its rivals then.
+    /// Adds the twins of the best set of a path to the fits of its last round.
+    ///
+    /// A twin that is worth more, because its name is more likely, replaces the best set. So does a
+    /// twin with fewer values that the evidence does not separate from it. Twins of the new best
+    /// set become its rivals.
     pub(super) fn with_twins(&self, path: &mut Path) -> Result<()> {
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         for _ in 0..MOST {
@@ -119,7 +131,8 @@ impl Search<'_> {
             let best = &mut path.best;
             let simpler = twins.iter_mut().find(|twin| self.is_simpler(twin, best));
             if let Some(twin) = simpler {
-                // Both scatter about the same evidence: the simpler one is worth no less, and the other is its rival.
+                // Both scatter about the same evidence: the simpler one is worth no less, and the
+                // other is its rival.
                 let most = twin.fitted.evidence.max(best.fitted.evidence);
                 twin.fitted.evidence = most;
                 best.fitted.evidence = most;
@@ -139,7 +152,8 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Whether a twin is as likely as the set that stands by all that is known, and has fewer values.
+    /// Whether a twin has fewer values than the set that stands, is at least as likely a priori,
+    /// and is not separated from it by the evidence.
     fn is_simpler(&self, twin: &Set, best: &Set) -> bool {
         let values = |s: &Set| s.fitted.hypothesis.free().len();
         let prior = |s: &Set| log_prior(self.context.plant(), self.candidates, &s.candidates);
@@ -148,7 +162,7 @@ impl Search<'_> {
             && twin.is_level_with(best, rise(self.context))
     }
 
-    /// Twins of the best set of a path, each fitted a little.
+    /// Twins of the best set of a path, each fitted briefly.
     fn twins(&self, path: &Path) -> Result<Vec<Set>> {
         let (context, best) = (self.context, &path.best);
         let rise = rise(context);
@@ -194,7 +208,8 @@ mod tests {
 
     #[test]
     fn what_was_level_changes_places_beside_what_came_later() {
-        // Friction (1, 2) and friction with a servo's damping (1, 3) were level; tolerances (8, 9) came later.
+        // Friction (1, 2) and friction with a servo's damping (1, 3) were equal; tolerances (8, 9)
+        // came later.
         let swap = |best: &[usize]| exchanged(best, &[1, 2], &[1, 3]);
         assert_eq!(swap(&[1, 2, 8, 9]), Some([vec![2], vec![3]]));
         assert_eq!(swap(&[1, 2]), None, "it is a rival as it is");

@@ -1,4 +1,5 @@
-//! What tolerances change of what is named: a value that outgrows its tolerance is named, and a name that does nothing beside them is not.
+//! Changes of the names by tolerances: a value that exceeds its tolerance is named, and a name that
+//! adds nothing to tolerances is removed.
 
 use asid_core::{Progress, Result};
 
@@ -12,14 +13,15 @@ use crate::settings::Breadth;
 
 use super::{DEVIATIONS, Member, Tolerances, deviation_within};
 
-/// How much more evidence than the threshold tangents may promise for a name that is tried without: they are right to a
-/// factor of some three.
+/// Largest predicted loss, in thresholds, at which a set is refitted without a name: first-order
+/// predictions are right to a factor of about three.
 const TANGENT: f64 = 3.0;
-/// Share of a tolerance from which on a value is at its end.
+/// Fraction of a tolerance from which on a value is at its end.
 const AT_END: f64 = 0.95;
 
 impl Tolerances {
-    /// A set with them beside it, where that earns the threshold and makes up for the share of what was missing `at_first` that a name must.
+    /// A set with tolerances added, if they pass the threshold and make up for the share of what
+    /// was missing `at_first` that a name must.
     pub(in crate::latent_force::search) fn earned(
         &self,
         context: &Context<'_>,
@@ -36,8 +38,8 @@ impl Tolerances {
         Ok(stands.then_some(with))
     }
 
-    /// A fitted set with them, with the names that it then has: those of values that outgrow their tolerance, and without those that do
-    /// nothing beside them.
+    /// Settles the names of a fitted set with tolerances: names values that exceed their tolerance,
+    /// and removes names that add nothing.
     pub(in crate::latent_force::search) fn settled(
         &self,
         context: &Context<'_>,
@@ -49,8 +51,12 @@ impl Tolerances {
         needed(context, candidates, set, how)
     }
 
-    /// A fitted set whose values at the end of their tolerance are let go beyond: each such effect is named. The set as it is where none is,
-    /// or where that does not earn the threshold, or does not make up for the share of what was missing `at_first` that a name must.
+    /// Releases the values of a fitted set that are at the end of their tolerance, and names each
+    /// such effect.
+    ///
+    /// Returns the set as it is if there is no such value, or if the release does not pass the
+    /// threshold. The same holds if it does not make up for the share of what was missing
+    /// `at_first` that a name must.
     fn outgrown(
         &self,
         context: &Context<'_>,
@@ -114,7 +120,7 @@ impl Tolerances {
     }
 }
 
-/// Values of a candidate of a set; `None` where it is not in it.
+/// Values of a candidate of a set; `None` if it is not a member.
 fn values_of(candidates: &[Candidate], set: &Set, candidate: usize) -> Option<Vec<f64>> {
     let mut at = set.fitted.theta.len();
     for &c in set.candidates.iter().rev() {
@@ -127,8 +133,10 @@ fn values_of(candidates: &[Candidate], set: &Set, candidate: usize) -> Option<Ve
     None
 }
 
-/// A set with tolerances without the names that do nothing beside these: each law in turn is taken out, or back to its tolerance where
-/// an ordinary machine has some of it, and stays out unless it earns the threshold.
+/// Removes the names of a set with tolerances that add nothing to these.
+///
+/// Each law in turn is removed, or put back within its tolerance if an ordinary machine has some of
+/// it. It stays out unless it earns the threshold.
 fn needed(
     context: &Context<'_>,
     candidates: &[Candidate],
