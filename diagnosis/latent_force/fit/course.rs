@@ -1,23 +1,26 @@
-//! What a fit has come through: the evidence at each linearisation, and the best of them.
+//! The course of a fit: the evidence at each linearisation, and the best one.
 
 use super::{Fitted, MISLED};
 
 /// The linearisations of a fit so far.
 #[derive(Default)]
 pub(super) struct Course {
-    /// The best of all.
+    /// The best linearisation.
     best: Option<Fitted>,
-    /// The best by slopes that were taken there: by those of a like model, or of another place, it may come out far too well.
+    /// The best with derivatives taken at that point; those of a similar model, or of another
+    /// point, may overstate the evidence.
     own: Option<Fitted>,
-    /// Evidence at each.
+    /// Evidence at each linearisation.
     all: Vec<f64>,
-    /// Evidence of the best after each.
+    /// Best evidence after each linearisation.
     reached: Vec<f64>,
 }
 
 impl Course {
-    /// Evidence of the best before a linearisation, by whose slopes, its `own` or not, it is `here`. Where own slopes show far less, the best by
-    /// such takes the place of the best.
+    /// Returns the best evidence before a linearisation whose evidence is `here`, by its `own`
+    /// derivatives or by others.
+    ///
+    /// If its own derivatives show far less than the best, the best by own derivatives replaces it.
     pub(super) fn before(&mut self, here: f64, is_own: bool) -> Option<f64> {
         let misled = |best: &Fitted| best.evidence - here > MISLED;
         if is_own && self.best.as_ref().is_some_and(misled) {
@@ -44,12 +47,12 @@ impl Course {
         &self.all
     }
 
-    /// Evidence of the best after each.
+    /// Best evidence after each linearisation.
     pub(super) fn reached(&self) -> &[f64] {
         &self.reached
     }
 
-    /// The best.
+    /// Returns the best linearisation.
     pub(super) fn best(self) -> Option<Fitted> {
         self.best
     }

@@ -1,20 +1,21 @@
-//! How far a fit goes.
+//! The extent of a fit.
 
 use asid_core::Progress;
 
-/// Linearisations over which the pace of a fit is told.
+/// Linearisations over which the pace of a fit is measured.
 const PACE: usize = 2;
-/// Linearisations from which on a fit may be given up for a rival's evidence: the first few raise it most.
+/// Linearisations after which a fit may be given up for a rival's evidence: the first few raise it
+/// most.
 const TRIED: usize = 4;
 
-/// How far a fit goes.
+/// The extent of a fit.
 #[derive(Clone, Copy)]
 pub struct Extent<'p> {
-    /// Most linearisations.
+    /// Largest number of linearisations.
     pub rounds: usize,
-    /// Evidence, natural logarithm, that it must come to; without it, all that there is.
+    /// Evidence (natural logarithm) that the fit must be able to reach; `None` for no requirement.
     pub rival: Option<f64>,
-    /// Whether the variances of missing forces are first settled joint by joint.
+    /// Whether the variances of missing forces are first fitted joint by joint.
     pub settles: bool,
     /// Work that may be stopped.
     pub progress: &'p dyn Progress,
@@ -32,8 +33,10 @@ impl<'p> From<(usize, &'p dyn Progress)> for Extent<'p> {
 }
 
 impl Extent<'_> {
-    /// Whether a fit does not come to its rival: at the pace of its last linearisations, of which each has raised the evidence to one of `reached`,
-    /// and with what a step promises.
+    /// Whether a fit will not reach its rival's evidence.
+    ///
+    /// The forecast extrapolates the pace of the last linearisations, whose best evidences are
+    /// `reached`, and adds the gain that a step predicts.
     pub(super) fn is_out_of_reach(&self, reached: &[f64], promised: f64) -> bool {
         let n = reached.len();
         let Some(rival) = self.rival.filter(|_| n >= TRIED) else {
@@ -58,7 +61,7 @@ mod tests {
             rival,
             ..Extent::from((10, &Silent as &dyn Progress))
         };
-        // It has risen by 10 in each of the last two, and has 6 to go.
+        // It has risen by 10 in each of the last two linearisations, and has 6 left.
         let reached = [0.0, 50.0, 60.0, 70.0];
         assert!(!extent(Some(130.0)).is_out_of_reach(&reached, 0.0));
         assert!(extent(Some(131.0)).is_out_of_reach(&reached, 0.0));

@@ -1,42 +1,46 @@
-//! Columns of values, kept while they hardly change (a chord method): those of tolerances from one fit to the next too.
+//! Columns of values, kept while they hardly change (a chord method); those of tolerances are kept
+//! from one fit to the next too.
 //!
-//! Each column is a simulation of all logs in each linearisation. Along the steps of a fit the trajectory stays near the readings, and while
-//! no value moves far its column stays what it was. A machine has many tolerances, and a gram more, or a millimetre, does nearly the
-//! same all along a search.
+//! Each column costs a simulation of all logs per linearisation. During a fit the trajectory stays
+//! near the readings, so a column hardly changes while no value moves far. A machine has many
+//! tolerances. A gram or a millimetre more has nearly the same effect throughout a search.
 
 use std::sync::Arc;
 
 use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::step_map::LinearEpisode;
 
-/// Linearisations that those of tolerances are kept for in one fit: a race of so many takes none, a fit to the end takes them anew as its
-/// other values move.
+/// Linearisations for which the columns of tolerances are kept in one fit: a race of this length
+/// computes none. A fit to the end computes them anew as its other values move.
 const KEPT: usize = 4;
-/// How far any other value may move meanwhile, as a share of its size and of the deviation of its prior: a law that is no straight line bends
-/// over either.
+/// Largest move of any other value while columns are kept, relative to the smaller of its size and
+/// its prior's standard deviation: a nonlinear law bends over either.
 const KEPT_MOVE: f64 = 0.1;
 
-/// Columns of one walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns x m`.
+/// Columns of one walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns
+/// x m`.
 #[derive(Debug, Default)]
 struct Along {
     states: Vec<f64>,
     readings: Vec<f64>,
 }
 
-/// Columns of values, in deviations of their priors.
+/// Columns of values, in standard deviations of their priors.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KeptColumns {
-    /// Names of their parameters, and whether they are tolerances.
+    /// Names of the columns' parameters, and whether they are tolerances.
     names: Arc<Vec<String>>,
     of_tolerances: Arc<Vec<bool>>,
     walks: Arc<Vec<Along>>,
-    /// Where those of other values than tolerances were taken: all values of the model; none of another fit's.
+    /// All values of the model where the columns of values other than tolerances were taken; `None`
+    /// for those of another fit.
     theta: Option<Vec<f64>>,
-    /// Linearisations that have used them.
+    /// Linearisations that have used the columns.
     used: usize,
 }
 
-/// The largest move of a value, in deviations of its prior; tolerances aside, which are narrow.
+/// Returns the largest move of a value, in standard deviations of its prior, without tolerances,
+/// whose priors are narrow.
 pub(super) fn furthest(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> f64 {
     let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
     let pairs = from.iter().zip(to).zip(unknowns);
@@ -44,7 +48,7 @@ pub(super) fn furthest(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> f64 {
     pairs.map(moved).fold(0.0, f64::max)
 }
 
-/// Whether no value but a tolerance has moved by more than the share of itself that columns stand.
+/// Whether every value other than a tolerance has moved by less than its columns allow.
 fn is_near(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> bool {
     let mut pairs = from.iter().zip(to).zip(unknowns);
     pairs.all(|((a, b), u)| {
@@ -52,7 +56,7 @@ fn is_near(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> bool {
     })
 }
 
-/// Copies columns of a row-major matrix of `n` to their places in one of `m`.
+/// Copies columns of a row-major matrix of `n` columns to their places in one of `m` columns.
 fn fill(to: &mut [f64], m: usize, (from, n): (&[f64], usize), places: &[Option<usize>]) {
     for (to, from) in to.chunks_exact_mut(m).zip(from.chunks_exact(n)) {
         for (to, place) in to.iter_mut().zip(places) {
@@ -64,7 +68,7 @@ fn fill(to: &mut [f64], m: usize, (from, n): (&[f64], usize), places: &[Option<u
 }
 
 impl KeptColumns {
-    /// The same at the beginning of another fit, whose values are others.
+    /// Returns the columns for the beginning of another fit, whose values differ.
     pub(super) fn begun(&self) -> Self {
         Self {
             used: 0,
@@ -73,13 +77,14 @@ impl KeptColumns {
         }
     }
 
-    /// Lets go of those of other values than tolerances.
+    /// Drops the columns of values other than tolerances.
     pub(super) fn renew(&mut self) {
         self.theta = None;
     }
 
-    /// The place here of each of the values that are fitted; none for all where one that is a tolerance has no column here, or they have
-    /// been used for long.
+    /// Returns the place of each fitted value's kept column; `None` where it must be computed.
+    ///
+    /// All are `None` if a tolerance has no kept column, or if the columns have been used for long.
     pub(super) fn places(
         &self,
         (unknowns, free): (&[Unknown], &[usize]),
@@ -102,7 +107,8 @@ impl KeptColumns {
         places
     }
 
-    /// Puts the kept columns at their `places` into a linearisation, but for walks whose columns were taken `anew`.
+    /// Inserts the kept columns at their `places` into a linearisation, except along walks whose
+    /// columns were computed `anew`.
     pub(super) fn join(
         &mut self,
         linear: &mut [LinearEpisode],
@@ -121,7 +127,8 @@ impl KeptColumns {
         }
     }
 
-    /// Keeps the columns of a linearisation at some values, of which some are those that were `kept`.
+    /// Keeps the columns of a linearisation at given values; `kept` flags those that were already
+    /// kept.
     pub(super) fn keep(
         &mut self,
         linear: &[LinearEpisode],
@@ -166,7 +173,8 @@ mod tests {
         }
     }
 
-    /// Two rows of states and of readings: the number of a column is its name's, its row's tens.
+    /// Two rows of states and of readings: the number of a column is its name's plus ten times its
+    /// row.
     fn linear(names: &[f64]) -> LinearEpisode {
         let columns: Vec<f64> = [0.0, 10.0]
             .iter()
@@ -207,7 +215,7 @@ mod tests {
         let free = [3, 2, 1, 0];
         let places = kept.places((&unknowns, &free), &[0.0; 4]);
         assert_eq!(places, [None, Some(2), None, Some(0)]);
-        // What is kept was not taken; the second walk is anew.
+        // Kept columns were not computed; those of the second walk are fresh.
         let mut fresh = [linear(&[3.0, 9.0, 1.0, 9.0]), linear(&[3.0, 9.0, 1.0, 9.0])];
         kept.walks = Arc::new(vec![
             Along {

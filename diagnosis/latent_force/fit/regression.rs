@@ -1,4 +1,5 @@
-//! The regression on small changes of the values: its columns, its prior, and the evidence at common scales of `q`.
+//! The regression on small changes of the values: columns, prior, and evidence at common scales of
+//! `q`.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -12,10 +13,10 @@ use crate::latent_force::step_map::{LinearEpisode, Variation};
 
 /// Common factors of `q` at which models are compared.
 pub const SCALES: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
-/// Share of a prior's deviation that a slope is taken over.
+/// Step of a finite difference with respect to a value, relative to its prior's standard deviation.
 const SLOPE_STEP: f64 = 0.01;
 
-/// The regression of all walks.
+/// Returns the regression of all walks.
 pub fn regression(
     context: &Context<'_>,
     estimate: &Estimate,
@@ -29,7 +30,9 @@ pub fn regression(
     sum(problems.map(of_walk).collect(), m)
 }
 
-/// The regression of all walks, none of them a segment, on some of `m` columns, the variance of one missing force scaled.
+/// Returns the regression of all walks, none of them a segment, on some of `m` columns.
+///
+/// The variances of the missing force at one degree of freedom are scaled.
 pub fn regression_at(
     context: &Context<'_>,
     estimate: &Estimate,
@@ -54,7 +57,8 @@ fn sum(parts: Vec<Regression>, m: usize) -> Regression {
     sum
 }
 
-/// The values at which slopes are taken: each a little up, or down where up leaves its bounds.
+/// Returns the values for finite differences: each a little up, or down where up would leave its
+/// bounds.
 pub(super) fn variations(unknowns: &[Unknown], free: &[usize], theta: &[f64]) -> Vec<Variation> {
     free.iter()
         .map(|&i| {
@@ -71,20 +75,22 @@ pub(super) fn variations(unknowns: &[Unknown], free: &[usize], theta: &[f64]) ->
         .collect()
 }
 
-/// The evidence at the common scale of `q` at which it is largest.
+/// The evidence at the common scale of `q` that maximises it.
 pub(super) struct Compared {
     /// The scale.
     pub(super) scale: f64,
-    /// Evidence of the present values, not of where a step would lead.
+    /// Evidence at the present values, not at the end of a step.
     pub(super) here: f64,
-    /// What a step promises beyond it, to first order.
+    /// Gain beyond it that a step predicts, to first order.
     pub(super) promised: f64,
-    /// The regression, in deviations of the priors.
+    /// The regression, in standard deviations of the priors.
     pub(super) found: Evidence,
 }
 
-/// Centers and bounds of the coefficients, in deviations of their priors about the present values. The engine's own error comes last, with
-/// nothing known of its coefficient but its prior.
+/// Returns centers and bounds of the coefficients, in standard deviations of their priors about the
+/// present values.
+///
+/// The engine's own error comes last. Its coefficient has its prior and no bounds.
 pub(super) fn prior_of(
     context: &Context<'_>,
     (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
@@ -102,8 +108,11 @@ pub(super) fn prior_of(
     (center, bounds)
 }
 
-/// Compares the common scales of `q` for a model (its unknowns, the places of those that are fitted, and all values): the `whole` of them,
-/// or, about the scale that was best before, from the largest on while the evidence rises. `None` where there is no scale.
+/// Compares the common scales of `q` for a model, given its unknowns, the indices of the fitted
+/// ones, and all values.
+///
+/// If `whole`, it tries all scales. Otherwise it starts at the largest, the one that was best
+/// before, and stops once the evidence no longer rises. Returns `None` if there is no scale.
 pub(super) fn compare(
     context: &Context<'_>,
     estimate: &Estimate,
@@ -120,12 +129,12 @@ pub(super) fn compare(
         let sum = regression(context, estimate, linear, scale, m);
         let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
         let determinant = determinant_of(&found);
-        // At the present values, whatever the engine's own error is.
+        // At the present values, with the engine's own error marginalised.
         let own: f64 = (free.len()..m)
             .map(|e| 0.5 * (sum.moment[e] + center[e]).powi(2) / (1.0 + sum.gram[(e, e)]))
             .sum();
         let here = sum.log_likelihood + own - 0.5 * prior + determinant;
-        // What is no number is no model of the logs.
+        // A result that is not a number is no model of the logs.
         let here = if here.is_nan() {
             f64::NEG_INFINITY
         } else {
@@ -146,7 +155,7 @@ pub(super) fn compare(
     best
 }
 
-/// A covariance in deviations of the priors in the values' units.
+/// Converts a covariance from standard deviations of the priors to the values' units.
 pub(super) fn in_units(
     covariance: &DMatrix<f64>,
     unknowns: &[Unknown],
@@ -158,13 +167,13 @@ pub(super) fn in_units(
     })
 }
 
-/// Half the logarithm of the determinant of the posterior covariance, in units of the prior.
+/// Half the log-determinant of the posterior covariance, in units of the prior.
 fn determinant_of(found: &Evidence) -> f64 {
     let factor = found.covariance.clone().cholesky();
     factor.map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
 }
 
-/// Moves a linearisation by changes of the values that its columns are for.
+/// Shifts a linearisation by changes of the values of its columns.
 pub(super) fn shift(linear: &mut [LinearEpisode], changes: &[f64]) {
     let m = changes.len();
     if m == 0 {

@@ -1,23 +1,28 @@
-//! Slopes of a segment's replay in its start, mended by what replays do (Broyden 1965).
+//! Broyden updates (Broyden 1965) of the derivatives of a segment's replay with respect to its
+//! initial state.
 //!
-//! Slopes cost a replay for each coordinate of a start, and a step from one start to the next is replayed anyway: the slopes are
-//! changed as little as they can be to foretell what it did.
+//! These derivatives cost one replay per coordinate of the initial state. A step from one initial
+//! state to the next is replayed anyway. The update is the smallest change of the derivatives that
+//! reproduces what the step did.
 
-/// A replay of a segment: its residuals, what its model's values do to its readings, and where it begins.
+/// A replay of a segment: its residuals, the columns of its model's values, and its initial state.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Replayed {
-    /// `reading - prediction`, one a reading; NaN where there is none.
+    /// `reading - prediction`, one per reading; NaN where a reading is missing.
     pub(super) residual: Vec<f64>,
-    /// Change of each reading by a deviation of each value, `readings x m`.
+    /// Change of each reading per standard deviation of each value, `readings x m`.
     pub(super) columns: Vec<f64>,
-    /// First state.
+    /// Initial state.
     pub(super) start: Vec<f64>,
-    /// Values, in deviations of their priors, `m`.
+    /// Values, in standard deviations of their priors, `m`.
     pub(super) values: Vec<f64>,
 }
 
-/// Changes the slopes `h` (`readings x nx`) of a replay so that they foretell the next one, whose start lies `change` from its own; each
-/// coordinate in units of `steps`. Nothing where the start has moved by less than one of these: noise would make the slopes.
+/// Updates the derivatives `h` (`readings x nx`) of a replay to predict the next replay, whose
+/// initial state differs by `change`.
+///
+/// Coordinates are in units of `steps`. Nothing happens if the initial state has moved by less than
+/// one step, because noise would dominate the update.
 pub(super) fn mend(
     h: &mut [f64],
     (before, after): (&Replayed, &Replayed),
@@ -66,12 +71,13 @@ mod tests {
         after.residual[1] = f64::NAN;
         let mut h = vec![1.0, 2.0, 3.0, 4.0];
         mend(&mut h, (&before, &after), &change, &steps);
-        // 0.7 is what the reading did, 0.5 * 0.2 of it by the value.
+        // The reading changed by 0.7, of which 0.5 * 0.2 is due to the value.
         assert!(
             (h[0] * change[0] + h[1] * change[1] - 0.6).abs() < 1e-12,
             "{h:?}"
         );
-        // Across the step, in units of the steps, nothing is learnt: (4, 3) * 2 in those units is at right angles to (3, -2).
+        // Orthogonal to the step, in units of the steps, nothing is learnt: (3, -2) in those units
+        // is the step, and (2, 3) is orthogonal to it.
         let across = [2.0 * steps[0], 3.0 * steps[1]];
         let told = |h: &[f64]| h[0] * across[0] + h[1] * across[1];
         assert!((told(&h[..2]) - told(&[1.0, 2.0])).abs() < 1e-12);

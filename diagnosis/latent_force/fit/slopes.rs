@@ -1,6 +1,7 @@
-//! Slopes in the state that are kept while they hardly change (a chord method).
+//! Derivatives with respect to the state, kept while they hardly change (a chord method).
 //!
-//! They cost most of a linearisation, and what is found does not depend on them, only how fast.
+//! They are the largest cost of a linearisation. The result of a fit does not depend on them, only
+//! its speed does.
 
 use asid_core::Result;
 
@@ -14,46 +15,53 @@ use super::Hypothesis;
 use super::kept_columns::{KeptColumns, furthest};
 use super::secant::{Replayed, mend};
 
-/// Linearisations that slopes along rows are kept for: their trajectory moves in each.
+/// Linearisations for which derivatives along rows are kept: the trajectory moves in each.
 const KEPT: usize = 3;
-/// How far a value may move meanwhile, in deviations of its prior.
+/// Largest move of a value while derivatives are kept, in standard deviations of its prior.
 const KEPT_MOVE: f64 = 0.3;
-/// How far the start of a segment may move meanwhile, in steps that its slopes are taken over.
+/// Largest move of a segment's initial state while derivatives are kept, in steps of their finite
+/// differences.
 const KEPT_START: f64 = 50.0;
-/// The same of a segment whose replay did not keep what its slopes promised: within a step the slopes are the same.
+/// The same for a segment whose replay left more than its derivatives predicted: within one step
+/// they would come out the same.
 const MISLED_START: f64 = 1.0;
 
-/// Information that the readings of a segment have of a coordinate of its start, in units of what is known of it before, up to which the
-/// coordinate counts as blind: evidence changes by half of it. Where a body touches another, the six of what the contact blocks, and of how
-/// a body of revolution is turned, have less, the others 0.1 or more.
+/// Information of a segment's readings about a coordinate of its initial state, relative to the
+/// prior's, below which the coordinate counts as blind.
+///
+/// The evidence changes by half of this. Where a body touches another, six coordinates have less:
+/// those that the contact blocks, and the rotation of a body of revolution. The others have 0.1 or
+/// more.
 const BLIND: f64 = 1e-5;
 
-/// Slopes of each walk, and where they were taken.
+/// Derivatives of each walk, and the point at which they were taken.
 #[derive(Clone, Debug, Default)]
 pub struct Slopes {
     a: Vec<Vec<f64>>,
     carried: Vec<Vec<f64>>,
     h: Vec<Vec<f64>>,
-    /// Of each segment the coordinates of its start that its readings do not depend on, as far as that is known.
+    /// For each segment: coordinates of its initial state on which its readings do not depend, as
+    /// far as known.
     blind: Vec<Vec<bool>>,
     /// First states of the walks.
     first: Vec<Vec<f64>>,
-    /// The values.
+    /// Values of the model.
     theta: Vec<f64>,
-    /// Linearisations that have used them.
+    /// Linearisations that have used the kept derivatives.
     used: usize,
-    /// Whether they are those of one physics step of each row.
+    /// Whether the derivatives are those of one physics step of each row.
     by_one_step: bool,
     /// Columns of values.
     columns: KeptColumns,
-    /// Whether the last linearisation kept columns of values that are no tolerances.
+    /// Whether the last linearisation kept columns of values other than tolerances.
     kept_values: bool,
-    /// The replay of each segment in the linearisation before; none at the beginning of a fit, whose values are others.
+    /// Replay of each segment in the linearisation before; empty at the beginning of a fit, whose
+    /// values differ.
     replayed: Vec<Replayed>,
 }
 
 impl Slopes {
-    /// The same at the beginning of another fit.
+    /// Returns the derivatives for the beginning of another fit.
     #[must_use]
     pub fn begun(&self) -> Self {
         Self {
@@ -64,7 +72,7 @@ impl Slopes {
         }
     }
 
-    /// None, but for what segments are blind to, for a fit of the same model.
+    /// Returns no derivatives, only the blind coordinates of segments, for a fit of the same model.
     #[must_use]
     pub fn renewed(&self) -> Self {
         Self {
@@ -73,26 +81,30 @@ impl Slopes {
         }
     }
 
-    /// Of each segment the coordinates of its start that its readings do not depend on; empty where that is not known.
+    /// For each segment: coordinates of its initial state on which its readings do not depend;
+    /// empty where unknown.
     #[must_use]
     pub fn blind(&self) -> &[Vec<bool>] {
         &self.blind
     }
 
-    /// Whether the last linearisation took slopes anew along the rows.
+    /// Whether the last linearisation computed derivatives along the rows anew.
     #[must_use]
     pub fn are_own(&self) -> bool {
         self.used == 0
     }
 
-    /// Whether the columns of some values that are no tolerances were kept in the last linearisation; from here on none are.
+    /// Whether the last linearisation kept columns of values other than tolerances; drops these
+    /// columns.
     pub fn renew_columns(&mut self) -> bool {
         self.columns.renew();
         std::mem::take(&mut self.kept_values)
     }
 
-    /// Linearises a model at some values about an estimate's trajectory, with slopes in the state, and columns of values, that are taken
-    /// anew where they are due, and kept elsewhere. `variations` has one for each value that is fitted, or none.
+    /// Linearises a model at given values about an estimate's trajectory.
+    ///
+    /// Derivatives with respect to the state and columns of values are computed anew where they are
+    /// due, and kept elsewhere. `variations` has one entry per fitted value, or none.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -103,10 +115,11 @@ impl Slopes {
         estimate: &Estimate,
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        // Slopes of segments are mended by each step that is made, and each that misleads is due by itself.
+        // Derivatives of segments are updated by each step, and a misleading one is due on its own
+        // account.
         let far = || furthest(&self.theta, theta, &model.unknowns) > KEPT_MOVE;
         let moved = self.h.is_empty() || !map.is_all_segments() && far();
-        // Readings that remember have slopes of their own past.
+        // Readings with memory have derivatives with respect to their own past.
         let along =
             moved || self.used >= KEPT || map.remembers_readings() && !map.is_all_segments();
         let due: Vec<bool> = (0..context.walks.len())
@@ -131,7 +144,7 @@ impl Slopes {
         } else {
             model.free()
         };
-        // Late readings are given to other rows.
+        // Late readings are assigned to other rows.
         let keeps = !map.remembers_readings() || map.is_all_segments();
         let values = (&model.unknowns[..], &free[..]);
         let places = if keeps {
@@ -142,7 +155,7 @@ impl Slopes {
         let kept: Vec<bool> = places.iter().map(Option::is_some).collect();
         let mut of_values = free.iter().zip(&kept);
         self.kept_values = of_values.any(|(&i, kept)| *kept && !model.unknowns[i].is_tolerance);
-        // Of a segment the columns are those of a replay from where it begins.
+        // The columns of a segment are those of a replay from its initial state.
         let is_segment = context.walks.iter().map(|w| w.segment.is_some());
         let left: Vec<bool> = is_segment.zip(&due).map(|(s, due)| s && *due).collect();
         let anew = Anew {
@@ -171,7 +184,8 @@ impl Slopes {
         Ok(linear)
     }
 
-    /// Whether the start of a segment is no longer where its slopes were taken, or these kept no promise.
+    /// Whether a segment has moved too far from where its derivatives were taken, or they
+    /// mispredicted a replay.
     fn has_left(&self, context: &Context<'_>, estimate: &Estimate, walk: usize) -> bool {
         let layout = &context.plant().layout;
         let now = &estimate.trajectory[walk][..layout.nq + layout.nv];
@@ -188,7 +202,7 @@ impl Slopes {
         furthest > most
     }
 
-    /// Mends the slopes of segments that are kept by what their replays did since the linearisation before.
+    /// Updates the kept derivatives of segments from their replays since the linearisation before.
     fn mend(
         &mut self,
         context: &Context<'_>,
@@ -216,7 +230,8 @@ impl Slopes {
         self.replayed = replayed;
     }
 
-    /// Notes what the readings of segments do not depend on, of those whose slopes are fresh and were taken in all coordinates.
+    /// Records blind coordinates, for segments whose derivatives are fresh and were taken for all
+    /// coordinates.
     fn see(
         &mut self,
         context: &Context<'_>,
@@ -233,7 +248,8 @@ impl Slopes {
         }
     }
 
-    /// Takes fresh slopes over where they were due, and gives the kept ones to the other walks.
+    /// Stores fresh derivatives where they were due, and fills in the kept ones along the other
+    /// walks.
     fn exchange(&mut self, linear: &mut [LinearEpisode], due: &[bool], trajectory: &[Vec<f64>]) {
         self.a.resize(linear.len(), Vec::new());
         self.carried.resize(linear.len(), Vec::new());

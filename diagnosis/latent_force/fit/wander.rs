@@ -1,12 +1,16 @@
-//! What the evidence scatters by where replays of segments are linearised.
+//! Scatter of the evidence with the point at which replays of segments are linearised.
 
 use crate::noise::median;
 
-/// Fewest linearisations without a rise that tell a scatter: of one or two, either may be a step that went far astray.
+/// Fewest linearisations without a rise that show a scatter: with one or two, either may be a step
+/// that went far astray.
 const FEWEST: usize = 3;
 
-/// Median of how far the evidence of each linearisation came out from the best before it, of those that did not raise that by what
-/// counts; 0 where there are too few. A step that went far astray is one of them, and so is each that finds the same plateau again.
+/// Returns the median difference between a linearisation's evidence and the best before, over those
+/// without a rise.
+///
+/// Zero if there are too few of them. A step that went far astray is one, and so is each return to
+/// the same plateau.
 pub(super) fn wander(evidence: &[f64], rise: f64) -> f64 {
     let mut apart = Vec::new();
     let mut best = f64::NEG_INFINITY;
@@ -28,7 +32,7 @@ mod tests {
 
     #[test]
     fn a_step_that_went_far_astray_is_not_what_evidence_scatters_by() {
-        // Two steps about contacts lost 2000 and 21,000, and the plateau was found again.
+        // Two steps about contacts lost 2000 and 21,000, and then the plateau was found again.
         let rounds = [
             52771.6, 50557.4, 31621.3, 52785.0, 52900.1, 52900.4, 52900.9, 52901.1,
         ];

@@ -1,49 +1,52 @@
-//! Steps that may lose at first, and are taken back where they do not win (a watchdog: Chamberlain and others 1982), for a narrow valley
-//! bends away from its tangent.
+//! Watchdog for the steps of a fit (Chamberlain and others 1982): a step may lose evidence at
+//! first, and is undone if later steps do not regain it.
+//!
+//! Losses are accepted because a narrow valley bends away from its tangent.
 
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 
-/// Part of a step that is tried where the whole made things worse.
+/// Factor by which a step is shortened where the whole made things worse.
 const SHORTER: f64 = 0.3;
-/// Rounds without a rise that are gone on with.
+/// Rounds without a rise that are accepted.
 const PATIENCE: usize = 2;
-/// Shorter steps from one point that are tried, at most.
+/// Most shorter steps that are tried from one point.
 const FAILURES: usize = 2;
 
 /// Values of a model and an estimate about them.
 pub(super) type Place = (Vec<f64>, Estimate);
 
-/// A point from which steps are taken: what it and its step promise, and where that leads.
+/// A point from which steps are taken, with its evidence, its predicted evidence and where its step
+/// leads.
 struct Anchor {
-    /// Evidence there, and with what a step promises.
+    /// Evidence there, and that evidence plus the gain that a step predicts.
     here: f64,
     hoped: f64,
     from: Place,
     to: Place,
 }
 
-/// What a linearisation shows of the step that led to it.
+/// What a linearisation shows about the step that led to it.
 pub(super) struct Outcome {
-    /// Evidence there, and with what a further step promises.
+    /// Evidence there, and that evidence plus the gain that a further step predicts.
     here: f64,
     hoped: f64,
-    /// Whether either has risen by what counts.
+    /// Whether either has risen enough to count.
     pub(super) rose: bool,
-    /// Whether the tangents have led astray.
+    /// Whether the linearisations have misled the fit.
     pub(super) astray: bool,
 }
 
 /// The watchdog of a fit.
 pub(super) struct Watchdog {
-    /// Evidence that counts as a rise.
+    /// Change of evidence that counts as a rise.
     rise: f64,
-    /// Whether evidence falls by itself, as that of segments does.
+    /// Whether evidence scatters without cause, as that of segments does.
     wanders: bool,
     anchor: Option<Anchor>,
-    /// Part of the anchor's step that was tried last.
+    /// Fraction of the anchor's step that was tried last.
     part: f64,
-    /// Rounds without a rise, and shorter steps from the anchor.
+    /// Rounds without a rise, and shorter steps tried from the anchor.
     waited: usize,
     failed: usize,
 }
@@ -60,14 +63,15 @@ impl Watchdog {
         }
     }
 
-    /// Looks at the evidence `here`, at what a step promises from here, and at the `best` evidence before.
+    /// Judges a linearisation by its evidence `here`, by the gain that a step from it predicts, and
+    /// by the `best` evidence before.
     pub(super) fn look(&mut self, (here, promised): (f64, f64), best: Option<f64>) -> Outcome {
         let hoped = here + promised;
         let anchor = self.anchor.as_ref();
         let rose = best.is_none_or(|b| here > b + self.rise)
             || anchor.is_none_or(|a| hoped > a.hoped + self.rise);
         self.waited = if rose { 0 } else { self.waited + 1 };
-        // A step that lost more than it had promised to win is no narrow valley.
+        // A step that lost more than its predicted gain is not in a narrow valley.
         let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(self.rise);
         let lost = !self.wanders && anchor.is_some_and(lost);
         Outcome {
@@ -78,12 +82,12 @@ impl Watchdog {
         }
     }
 
-    /// Whether shorter steps have failed too.
+    /// Whether the shorter steps have failed too.
     pub(super) fn is_out_of_steps(&self) -> bool {
         self.failed == FAILURES
     }
 
-    /// Less of the way from the anchor; `None` where there is none.
+    /// Returns the end of a shorter step from the anchor; `None` where there is no anchor.
     pub(super) fn shorter(&mut self, context: &Context<'_>) -> Option<Place> {
         let Anchor { from, to, .. } = self.anchor.as_ref()?;
         self.part *= SHORTER;
@@ -94,7 +98,8 @@ impl Watchdog {
         Some((values.collect(), from.1.towards(context, &to.1, self.part)))
     }
 
-    /// Makes the point of an outcome the anchor of a step that was taken `from` it `to` another.
+    /// Makes the point of an outcome the anchor of the step that leads `from` it `to` another
+    /// point.
     pub(super) fn anchor(&mut self, at: &Outcome, from: Place, to: Place) {
         self.part = 1.0;
         self.failed = 0;
