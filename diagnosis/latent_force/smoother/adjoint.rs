@@ -1,9 +1,11 @@
 //! The backward pass: the adjoint recursion of Bryson and Frazier, from the last row to the first.
 //!
-//! With `P` and `m` of the forward pass, the smoothed state is `m - P lambda` and its covariance `P - P Lambda P`; the adjoint
-//! variables `lambda` and `Lambda` take up each reading and go back through each transition (Bierman 1977). States are smoothed from the filtered
-//! state *after* the row's readings. From the predicted one, a wide prior and a fine reading would leave a small
-//! difference of two large numbers.
+//! With `P` and `m` of the forward pass, the smoothed state is `m - P lambda` and its covariance `P
+//! - P Lambda P`. The adjoint variables `lambda` and `Lambda` absorb each reading and are
+//! propagated back through each transition (Bierman 1977).
+//!
+//! States are smoothed from the filtered state *after* the row's readings. From the predicted
+//! state, a wide prior and a precise reading would leave a small difference of two large numbers.
 
 use super::Smoothed;
 use super::filter::{Filter, Step};
@@ -33,9 +35,9 @@ pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
     pass.out
 }
 
-/// What the sums of a row need of the row after it.
+/// Values of the later row that the sums of a row need.
 struct Later {
-    /// Rows of `P Lambda` that belong to the forces, before its readings, `nv x nz`.
+    /// Rows of `P Lambda` that belong to the forces, before that row's readings, `nv x nz`.
     correction: Vec<f64>,
     /// Smoothed forces and their variances, `nv`.
     force: Vec<f64>,
@@ -69,13 +71,13 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// Nothing that follows tells of this row.
+    /// Resets the adjoint variables, where later rows carry no information about this one.
     fn forget(&mut self) {
         self.vector.fill(0.0);
         self.matrix.fill(0.0);
     }
 
-    /// Adds the expected square of the forces' white part between row `k` and the next to its sums.
+    /// Adds to the sums the expected square of the forces' white part between row `k` and the next.
     fn sum_white(&mut self, k: usize) {
         let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
         for j in 0..nv {
@@ -92,7 +94,8 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// Carries the adjoint variables back through the transition of row `k`, which the filter holds from here on.
+    /// Propagates the adjoint variables back through the transition of row `k`, which the filter
+    /// holds from here on.
     fn transport(&mut self, k: usize) {
         let nz = self.filter.nz;
         self.filter.set_transition(k);
@@ -107,7 +110,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         symmetrise(&mut self.matrix, nz);
     }
 
-    /// Smoothed state and force of row `k`, with their variances.
+    /// Stores the smoothed state and force of row `k`, with their variances.
     fn smooth(&mut self, k: usize, step: &Step) {
         let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
         multiply(&step.covariance, &self.matrix, nz, &mut self.scratch);
@@ -128,7 +131,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// Adds what is left of the readings of row `k`, with its variance, to their sums.
+    /// Adds the squared residuals of row `k`, with their variances, to the sums.
     fn sum_readings(&mut self, k: usize, step: &Step) {
         let (nx, nz, ns) = (self.filter.nx, self.filter.nz, self.filter.ns);
         for taken in &step.taken {
@@ -148,7 +151,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// Adds the expected squares and products of the forces of row `k` and of the row after it to their sums.
+    /// Adds to the sums the expected squares and products of the forces of row `k` and the next.
     fn sum_forces(&mut self, k: usize, step: &Step, later: &Later) {
         let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
         let time = &self.filter.problem.walk.time;
@@ -172,7 +175,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// Takes the readings of row `k` up into the adjoint variables, the last one first.
+    /// Absorbs the readings of row `k` into the adjoint variables, the last one first.
     fn take_up(&mut self, k: usize, step: &Step) {
         let (nx, nz) = (self.filter.nx, self.filter.nz);
         for taken in step.taken.iter().rev() {
@@ -198,7 +201,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// What the row before `k` needs of it.
+    /// Returns the values of row `k` that the row before needs.
     fn later(&self, k: usize, step: &Step) -> Later {
         let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
         let mut correction = vec![0.0; nv * nz];

@@ -1,9 +1,13 @@
-//! Degrees of freedom that nothing couples, filtered apart.
+//! Uncoupled degrees of freedom, each filtered as a block of its own.
 //!
-//! Two arms on a table, or an arm beside a thing that lies there, move each by themselves: the transition, the slopes in forces and those of
-//! the readings are block-diagonal, and so is the covariance. A filter of each block does what one of all does, for a cost that grows with the
-//! cube of the largest block. The blocks are found in the slopes themselves, where a coupling is a number that is more than rounding: no
-//! knowledge of the machine is needed, and what touches in some row of an episode is one block in it.
+//! Two arms on a table, or an arm and an object beside it, each move on their own. The transition
+//! and the derivatives with respect to forces and of the readings are block-diagonal, and so is the
+//! covariance. One filter per block gives the same result as one filter for all. Its cost grows
+//! with the cube of the largest block.
+//!
+//! The blocks are found in the derivatives themselves, where a coupling is an entry larger than
+//! rounding. No knowledge of the machine is needed. Bodies that touch in some row of an episode
+//! form one block throughout it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -12,14 +16,14 @@ use crate::latent_force::step_map::LinearEpisode;
 
 use super::{NoiseModel, Problem, Regression, Smoothed, Start};
 
-/// The block of each degree of freedom of an episode, and of each entry of a reading.
+/// The blocks of an episode: degrees of freedom and entries of a reading in each.
 pub(super) struct Blocks {
     dofs: Vec<Vec<usize>>,
     entries: Vec<Vec<usize>>,
 }
 
 impl Blocks {
-    /// Those of an episode; `None` where all is one.
+    /// Finds the blocks of an episode; `None` if it is a single block.
     pub(super) fn of(problem: Problem<'_>, noise: &NoiseModel) -> Option<Self> {
         let (linear, b) = (problem.linear, problem.b);
         let (nv, ns) = (noise.q.len(), noise.r.len());
@@ -54,19 +58,19 @@ impl Blocks {
         for entry in 0..ns {
             let slopes = linear.h.chunks_exact(nx).skip(entry).step_by(ns);
             let read = slopes.flat_map(depends).next();
-            // What depends on no state is of any block.
+            // An entry that depends on no state may go to any block.
             blocks.entries[read.map_or(0, |i| of_dof[i % nv])].push(entry);
         }
         Some(blocks)
     }
 
-    /// Degrees of freedom of each.
+    /// Returns the number of degrees of freedom of each block.
     #[cfg(test)]
     pub(super) fn sizes(&self) -> Vec<usize> {
         self.dofs.iter().map(Vec::len).collect()
     }
 
-    /// What of an episode belongs to each block, without columns.
+    /// Splits an episode into its blocks, without columns.
     fn parts<'b, 'a: 'b>(
         &'b self,
         problem: Problem<'a>,
@@ -76,7 +80,7 @@ impl Blocks {
         each.map(move |own| Owned::of(problem, noise, (own.0, own.1)))
     }
 
-    /// Logarithm of the likelihood of an episode.
+    /// Returns the log-likelihood of an episode.
     pub(super) fn log_likelihood(&self, problem: Problem<'_>, noise: &NoiseModel) -> f64 {
         let parts = self.parts(problem, noise);
         parts
@@ -84,7 +88,7 @@ impl Blocks {
             .sum()
     }
 
-    /// The regression of an episode with `m` columns, or `some` of them.
+    /// Returns the regression of an episode on its `m` columns, or on `some` of them.
     pub(super) fn regress(
         &self,
         problem: Problem<'_>,
@@ -144,13 +148,13 @@ impl Blocks {
     }
 }
 
-/// Tangent coordinates of some degrees of freedom of `nv`, places before speeds.
+/// Tangent coordinates of some of `nv` degrees of freedom, positions before speeds.
 fn coordinates(dofs: &[usize], nv: usize) -> Vec<usize> {
     let speeds = dofs.iter().map(|d| nv + d);
     dofs.iter().copied().chain(speeds).collect()
 }
 
-/// Sets some places of each row of `n` numbers to those of a block.
+/// Writes the values of a block to their places in each row of `n` numbers.
 fn spread(own: &[f64], places: &[usize], n: usize, to: &mut [f64]) {
     let rows = own.chunks_exact(places.len()).zip(to.chunks_exact_mut(n));
     for (own, to) in rows {
@@ -158,7 +162,7 @@ fn spread(own: &[f64], places: &[usize], n: usize, to: &mut [f64]) {
     }
 }
 
-/// Some places of each row of `n` numbers, for some of every `period` rows.
+/// Selects some places of each row of `n` numbers, for some rows of every `period`.
 fn pick(
     all: &[f64],
     (n, places): (usize, &[usize]),
@@ -173,7 +177,7 @@ fn pick(
     out
 }
 
-/// An episode of one block, which owns what a [`Problem`] borrows.
+/// One block of an episode, which owns what a [`Problem`] borrows.
 struct Owned<'a> {
     of: Problem<'a>,
     linear: LinearEpisode,
@@ -181,12 +185,13 @@ struct Owned<'a> {
     start: Start,
     free: Vec<f64>,
     noise: NoiseModel,
-    /// Its coordinates of the state and its entries of a reading, of so many each.
+    /// The block's coordinates of the state and its entries of a reading, each with the number of
+    /// all in the episode.
     own: [(Vec<usize>, usize); 2],
 }
 
 impl<'a> Owned<'a> {
-    /// Of some degrees of freedom and entries, without columns.
+    /// Extracts the block of some degrees of freedom and entries, without columns.
     fn of(problem: Problem<'a>, noise: &NoiseModel, (dofs, entries): (&[usize], &[usize])) -> Self {
         let (nv, ns) = (noise.q.len(), noise.r.len());
         let nx = 2 * nv;
@@ -196,7 +201,7 @@ impl<'a> Owned<'a> {
             places.iter().filter_map(|&p| all.get(p).copied()).collect()
         };
         let mut defect = pick(&linear.defect, (1, &[0]), (nx, &own));
-        // Where the engine failed, no part of the machine was carried on.
+        // Where the engine failed, no part of the machine was stepped.
         let rows = defect
             .chunks_exact_mut(own.len())
             .zip(linear.defect.chunks_exact(nx));
@@ -233,7 +238,8 @@ impl<'a> Owned<'a> {
         }
     }
 
-    /// Takes those of some of the episode's `m` columns that show in the block, and returns their places among those asked for.
+    /// Copies the requested columns that are non-zero in the block; returns their places among the
+    /// requested ones.
     fn take_columns(
         &mut self,
         linear: &LinearEpisode,

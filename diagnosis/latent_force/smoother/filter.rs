@@ -1,33 +1,37 @@
-//! The forward pass: a Kalman filter from the first row to the last, reading by reading. The backward pass is `adjoint.rs`.
+//! The forward pass: a Kalman filter from the first row to the last, one reading at a time.
+//!
+//! The backward pass is in `adjoint.rs`.
 
 use super::matrix::{dot, multiply, multiply_abt, symmetrise};
 use super::{NoiseModel, Problem};
 
-/// Ratio of an innovation's variance to its reading's own from which on rounding is taken out of the covariance: it has
-/// lost 6 of a double's 16 digits there. A start within metres that is read to 10 um has a ratio of 1e11; rows
-/// within a walk stay far below.
+/// Ratio of an innovation's variance to its reading's own variance above which rounding is removed
+/// from the covariance.
+///
+/// There it has lost 6 of a double's 16 digits. An initial state known within metres and read to 10
+/// um has a ratio of 1e11; rows within a walk stay far below.
 pub(super) const FINE: f64 = 1e6;
 
-/// One reading of a row as it was taken.
+/// One processed reading of a row.
 pub(super) struct Taken {
     /// Its entry.
     pub(super) entry: usize,
-    /// Innovation and its variance.
+    /// The innovation and its variance.
     pub(super) innovation: f64,
     pub(super) variance: f64,
     /// Covariance of the state with the reading, `nz`.
     pub(super) gain: Vec<f64>,
 }
 
-/// A row on the way forward.
+/// One row of the forward pass.
 pub(super) struct Step {
-    /// Covariance before its readings.
+    /// Covariance before the row's readings.
     pub(super) predicted: Vec<f64>,
-    /// Mean and covariance after them.
+    /// Mean and covariance after the row's readings.
     pub(super) mean: Vec<f64>,
     pub(super) covariance: Vec<f64>,
     pub(super) taken: Vec<Taken>,
-    /// Whether the next row begins anew.
+    /// Whether the filter restarts at the next row.
     pub(super) breaks: bool,
 }
 
@@ -43,7 +47,7 @@ pub(super) struct Filter<'a> {
     pub(super) covariance: Vec<f64>,
     pub(super) transition: Vec<f64>,
     pub(super) scratch: Vec<f64>,
-    /// Of each entry: logarithm of the likelihood of its readings, and how many.
+    /// For each entry: log-likelihood of its readings, and their number.
     pub(super) log_likelihood: Vec<[f64; 2]>,
 }
 
@@ -69,7 +73,7 @@ impl<'a> Filter<'a> {
         filter
     }
 
-    /// Sets the state to the prior about the trajectory.
+    /// Sets the state to the prior of the initial state, centred on the trajectory.
     pub(super) fn begin(&mut self) {
         self.mean.fill(0.0);
         self.covariance.fill(0.0);
@@ -81,9 +85,11 @@ impl<'a> Filter<'a> {
         }
     }
 
-    /// Logarithm of the likelihood of all readings. Where a sensor is late, its first readings show the machine before the first row,
-    /// and no state here predicts them. Each counts as the mean of its entry's others, so that models with and without a delay are
-    /// compared on equally many readings.
+    /// Returns the log-likelihood of all readings.
+    ///
+    /// The first readings of a late sensor show the machine before the first row, and no state here
+    /// predicts them. Each counts as the mean of its entry's other readings. So models with and
+    /// without a delay are compared on equally many readings.
     pub(super) fn total(&self) -> f64 {
         let early = |i: usize| self.problem.linear.early.get(i).copied().unwrap_or(0.0);
         let entries = self.log_likelihood.iter().enumerate();
@@ -92,13 +98,13 @@ impl<'a> Filter<'a> {
             .sum()
     }
 
-    /// Slope of an entry of row `k` in the state.
+    /// Derivatives of an entry of row `k` with respect to the state.
     pub(super) fn slope(&self, k: usize, entry: usize) -> &'a [f64] {
         let at = (k * self.ns + entry) * self.nx;
         &self.problem.linear.h[at..at + self.nx]
     }
 
-    /// Takes an entry's reading, where there is one.
+    /// Processes the reading of an entry; returns `None` where it is missing.
     pub(super) fn take(&mut self, k: usize, entry: usize) -> Option<Taken> {
         let reading = self.problem.linear.residual[k * self.ns + entry];
         if !reading.is_finite() {
@@ -134,8 +140,10 @@ impl<'a> Filter<'a> {
         })
     }
 
-    /// Takes the rounding error out of a covariance `P` that a fine reading has just made small: with `K = gain / s`
-    /// it satisfies `P h = r K`, and the least symmetric change along `K` makes it so again.
+    /// Removes the rounding error from a covariance `P` that a precise reading has just made small.
+    ///
+    /// With `K = gain / s`, `P` satisfies `P h = r K`. The smallest symmetric change along `K`
+    /// restores this.
     pub(super) fn restore(&mut self, h: &[f64], gain: &[f64], (s, r): (f64, f64)) {
         let (nx, nz) = (self.nx, self.nz);
         let error: Vec<f64> = self
@@ -155,20 +163,20 @@ impl<'a> Filter<'a> {
         }
     }
 
-    /// Whether the engine carried row `k` to the next.
+    /// Whether the engine stepped row `k` to the next without failing.
     pub(super) fn carries(&self, k: usize) -> bool {
         let defect = &self.problem.linear.defect[k * self.nx..(k + 1) * self.nx];
         defect.iter().all(|x| x.is_finite())
     }
 
-    /// Correlation of each force from row `k` to the next.
+    /// Returns the correlation of each force between row `k` and the next.
     pub(super) fn correlation(&self, k: usize) -> impl Iterator<Item = f64> + 'a {
         let time = &self.problem.walk.time;
         let dt = time[k + 1] - time[k];
         self.noise.tau.iter().map(move |tau| (-dt / tau).exp())
     }
 
-    /// Fills in the transition of row `k`.
+    /// Fills in the transition matrix of row `k`.
     pub(super) fn set_transition(&mut self, k: usize) {
         let (nx, nv, nz) = (self.nx, self.nv, self.nz);
         self.transition.fill(0.0);
@@ -183,7 +191,7 @@ impl<'a> Filter<'a> {
         }
     }
 
-    /// Carries mean and covariance from row `k` to the next.
+    /// Propagates mean and covariance from row `k` to the next.
     pub(super) fn predict(&mut self, k: usize) {
         let (nx, nv, nz) = (self.nx, self.nv, self.nz);
         if !self.carries(k) {

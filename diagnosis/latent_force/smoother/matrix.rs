@@ -1,22 +1,23 @@
-//! Products of the small row-major square matrices that filters and smoothers are made of.
+//! Products of the small row-major square matrices in filters and smoothers.
 //!
-//! Most are of 3 to 66 rows and half full of zeros: small ones go by loops that pass over the zeros, larger ones by
-//! nalgebra's blocked product.
+//! Most have 3 to 66 rows, and half of their entries are zero. Small ones use loops that skip the
+//! zeros, larger ones nalgebra's blocked product.
 
 use nalgebra::{DMatrixView, DMatrixViewMut};
 
-/// Width from which on a blocked product beats loops that pass over zeros, measured on transitions of machines of 1 to 22
-/// degrees of freedom.
+/// Width from which a blocked product beats loops that skip zeros, measured on transitions of
+/// machines of 1 to 22 degrees of freedom.
 const BLOCKED: usize = 16;
-/// Sums that a dot product runs side by side: one alone waits for each addition to end.
+/// Partial sums that a dot product accumulates in parallel: with one, each addition waits for the
+/// one before.
 const LANES: usize = 8;
 
-/// A row-major square matrix product `out = a b`.
+/// Computes the product `out = a b` of row-major square matrices.
 pub(super) fn multiply(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
     multiply_columns(a, b, (n, n), out);
 }
 
-/// `out = a b'`.
+/// Computes `out = a b'`.
 pub(super) fn multiply_abt(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
     if n >= BLOCKED {
         let b = view(b, n).transpose();
@@ -31,10 +32,10 @@ pub(super) fn multiply_abt(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
     }
 }
 
-/// `out = a s` of a row-major square matrix and one of `m` columns.
+/// Computes `out = a s`, of a row-major square matrix and a matrix of `m` columns.
 pub(super) fn multiply_columns(a: &[f64], s: &[f64], (n, m): (usize, usize), out: &mut [f64]) {
     if n >= BLOCKED {
-        // Read by columns these are transposed, and `(a s)' = s' a'`.
+        // In column-major order these are transposed, and `(a s)' = s' a'`.
         let s = DMatrixView::from_slice(s, m, n);
         DMatrixViewMut::from_slice(out, m, n).gemm(1.0, &s, &view(a, n), 0.0);
         return;
@@ -51,7 +52,7 @@ pub(super) fn multiply_columns(a: &[f64], s: &[f64], (n, m): (usize, usize), out
     }
 }
 
-/// `out = a' b`.
+/// Computes `out = a' b`.
 pub(super) fn multiply_atb(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
     if n >= BLOCKED {
         let a = view(a, n).transpose();
@@ -68,12 +69,12 @@ pub(super) fn multiply_atb(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
     }
 }
 
-/// A row-major square matrix, read by columns: its transpose.
+/// Views a row-major square matrix in column-major order, as its transpose.
 fn view(a: &[f64], n: usize) -> DMatrixView<'_, f64> {
     DMatrixView::from_slice(a, n, n)
 }
 
-/// The dot product.
+/// Returns the dot product.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (mut x, mut y) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let mut sums = [0.0; LANES];
@@ -86,7 +87,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
 }
 
-/// Makes a row-major square matrix symmetric: each pair of entries becomes its mean.
+/// Symmetrises a row-major square matrix: each pair of entries becomes its mean.
 pub(super) fn symmetrise(p: &mut [f64], n: usize) {
     for i in 0..n {
         for j in 0..i {

@@ -7,10 +7,10 @@ use super::matrix::multiply_columns;
 use super::shown::Shown;
 use super::{NoiseModel, Problem, Regression};
 
-/// Innovations that are collected before they are added up.
+/// Number of innovations that are collected before their products are summed.
 pub(super) const BLOCK: usize = 128;
 
-/// Filters an episode with its `m` columns, or some of them.
+/// Filters an episode with its `m` columns, or with some of them.
 #[must_use]
 pub fn regress(
     problem: Problem<'_>,

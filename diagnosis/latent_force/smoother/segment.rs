@@ -1,27 +1,30 @@
-//! A segment: no force is missing along it, and only its start is open.
+//! A segment: no force is missing along it, and only its initial state is unknown.
 //!
-//! Its slopes are those of its whole replay, for a contact's slopes over one row are those of points that come and go: every
-//! reading is linear in the change of the start and in the columns, and the filter is a least-squares problem in
-//! `nx` unknowns with a prior.
+//! Its derivatives are those of its whole replay, because those of a contact over single rows
+//! reflect contact points that appear and vanish. Every reading is linear in the change of the
+//! initial state and in the columns. The filter is then a least-squares problem in `nx` unknowns
+//! with a prior.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{NoiseModel, Problem, Regression, Smoothed};
 
-/// Shares of the diagonal by which the normal equations are lengthened for the shorter steps of a start that are offered.
+/// Relative increases of the normal equations' diagonal that give the shorter steps of an initial
+/// state (Levenberg-Marquardt damping).
 const DAMPINGS: [f64; 2] = [1.0, 100.0];
 
-/// The readings of a segment in units of their deviations, and what they are linear in.
+/// Readings of a segment in units of their standard deviations, with their derivatives.
 struct Rows {
     /// Entry of each reading.
     entry: Vec<usize>,
-    /// Readings.
+    /// Residuals of the readings.
     left: DVector<f64>,
-    /// Slopes in the change of the start, then directions of scatter, `readings x (nx + directions)`.
+    /// Derivatives with respect to the initial state, then directions of scatter, `readings x (nx +
+    /// directions)`.
     start: DMatrix<f64>,
-    /// Slopes in the columns, `readings x m`.
+    /// Derivatives with respect to the columns' coefficients, `readings x m`.
     columns: DMatrix<f64>,
-    /// Sum of the logarithms of the readings' deviations.
+    /// Sum of the logarithms of the readings' standard deviations.
     log_deviation: f64,
 }
 
@@ -62,8 +65,11 @@ impl Rows {
         }
     }
 
-    /// Normal equations of the start and of the scatter, in units of their priors' deviations: slopes, factor and right side. The
-    /// diagonal is lengthened by a share `damping` of itself (Marquardt 1963).
+    /// Returns the normal equations of the initial state and the scatter: derivatives, Cholesky
+    /// factor and right-hand side.
+    ///
+    /// Unknowns are in units of their priors' standard deviations. The diagonal is increased by a
+    /// fraction `damping` of itself (Marquardt 1963).
     fn normal(
         &self,
         problem: Problem<'_>,
@@ -86,7 +92,7 @@ impl Rows {
     }
 }
 
-/// Smooths a segment: the change of its start alone. There is no missing force.
+/// Smooths a segment, which changes only its initial state; no force is missing.
 pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     let rows = Rows::of(problem, noise, 0);
     let start = problem.start;
@@ -105,7 +111,7 @@ pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
         out.change[i] = change[i] * v.sqrt();
     }
     let left = &rows.left - &scaled * &change;
-    // What a replay leaves has the scatter in it.
+    // The residuals of a replay contain the scatter.
     let replayed = &rows.left - scaled.columns(0, nx) * change.rows(0, nx);
     // Variance of each prediction: the squared length of `L^-1 x`.
     let lower = factor.l();
@@ -152,7 +158,7 @@ fn log_likelihood(
     -0.5 * squares - determinant - rows.log_deviation
 }
 
-/// The regression of a segment, its start projected out.
+/// Returns the regression of a segment, with its initial state projected out.
 pub(super) fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression {
     let rows = Rows::of(problem, noise, m);
     let (scaled, factor, right) = rows.normal(problem, 0.0);
@@ -185,7 +191,8 @@ mod tests {
 
     const ROWS: usize = 6;
 
-    /// A segment of one degree of freedom: its place read with a deviation of 0.2, an open start, and one column.
+    /// A segment of one degree of freedom: a position read with a standard deviation of 0.2, an
+    /// unknown initial state, and one column.
     struct Case {
         walk: Walk,
         linear: LinearEpisode,
@@ -197,7 +204,7 @@ mod tests {
         fn new() -> Self {
             let time: Vec<f64> = (0..ROWS).map(|k| 0.1 * k as f64).collect();
             let mut residual: Vec<f64> = time.iter().map(|t| 0.3 - t + 4.0 * t * t).collect();
-            // The first row is of the lead.
+            // The first row belongs to the lead.
             residual[0] = f64::NAN;
             Self {
                 linear: LinearEpisode {
@@ -239,7 +246,8 @@ mod tests {
             }
         }
 
-        /// Covariance of all readings that count with the start open, what is left at its mean, and the column.
+        /// Returns the covariance of all readings that count with the initial state unknown, their
+        /// residuals at its mean, and the column.
         fn dense(&self) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
             let n = ROWS - 1;
             let h = DMatrix::from_row_slice(n, 2, &self.linear.h[2..]);
@@ -285,7 +293,7 @@ mod tests {
             assert!(length(damped) < before);
             before = length(damped);
         }
-        // What is left, and how uncertain it is, of five readings.
+        // Squared residuals and their uncertainty count five readings.
         assert_eq!(found.sums.reading[0][1], 5.0);
     }
 }

@@ -1,5 +1,7 @@
-//! Columns that show along an episode: those of another episode's values, or of a contact that it has not, are zero all along, and
-//! take no part in its regression.
+//! The columns that are non-zero along an episode.
+//!
+//! Columns of another episode's values, or of a contact that the episode lacks, are zero throughout
+//! and take no part in its regression.
 
 use std::borrow::Cow;
 
@@ -7,19 +9,19 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::latent_force::step_map::LinearEpisode;
 
-/// The columns of an episode that are asked for and not zero all along.
+/// The requested columns of an episode that are not zero throughout.
 pub(super) struct Shown<'c> {
-    /// Their places among those that are asked for.
+    /// Their places among the requested columns.
     places: Vec<usize>,
-    /// How many are asked for.
+    /// Number of requested columns.
     asked: usize,
-    /// Of the readings, `rows x ns x len`.
+    /// Columns of the readings, `rows x ns x len`.
     pub(super) readings: Cow<'c, [f64]>,
-    /// Of the states, `(rows - 1) x nx x len`.
+    /// Columns of the states, `(rows - 1) x nx x len`.
     pub(super) states: Cow<'c, [f64]>,
 }
 
-/// Some places of each row of `m` numbers.
+/// Selects some places of each row of `m` numbers.
 fn pick<'c>(rows: &'c [f64], m: usize, places: &[usize]) -> Cow<'c, [f64]> {
     if places.len() == m {
         return Cow::Borrowed(rows);
@@ -31,7 +33,7 @@ fn pick<'c>(rows: &'c [f64], m: usize, places: &[usize]) -> Cow<'c, [f64]> {
 }
 
 impl<'c> Shown<'c> {
-    /// Of an episode with `m` columns; of `some` of them, in ascending order, or of all.
+    /// Selects from an episode's `m` columns: from `some` of them, in ascending order, or from all.
     pub(super) fn of(linear: &'c LinearEpisode, m: usize, some: Option<&[usize]>) -> Self {
         let (readings, states) = (&linear.reading_columns, &linear.state_columns);
         let all: Vec<usize> = some.map_or_else(|| (0..m).collect(), <[usize]>::to_vec);
@@ -53,12 +55,12 @@ impl<'c> Shown<'c> {
         }
     }
 
-    /// How many there are.
+    /// Number of non-zero columns.
     pub(super) fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// Their products among all that are asked for.
+    /// Returns their products, at their places among all requested columns.
     pub(super) fn spread(
         &self,
         gram: &DMatrix<f64>,

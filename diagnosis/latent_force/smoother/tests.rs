@@ -1,7 +1,8 @@
 //! Episodes that the recursions are tested on.
 //!
-//! [`dense`] compares with the same normal distribution written down densely, [`known`] with answers that are
-//! known, [`noise`] tests what the noise model is estimated from, [`digits`] what rounding does.
+//! [`dense`] compares with the same normal distribution written as dense matrices, and [`known`]
+//! with known answers. [`noise`] tests the sums from which the noise model is estimated. [`digits`]
+//! tests the effect of rounding.
 
 mod dense;
 mod digits;
@@ -13,8 +14,8 @@ use rand::Rng;
 use super::regress::BLOCK;
 use super::*;
 
-/// Tolerance of two ways to the same number of order one, through a few dozen operations on well-conditioned
-/// matrices.
+/// Tolerance of two computations of the same number of order one, through a few dozen operations on
+/// well-conditioned matrices.
 const SAME: f64 = 1e-8;
 
 /// An episode that owns what a [`Problem`] borrows.
@@ -91,7 +92,8 @@ impl Case {
         }
     }
 
-    /// The same with nothing that couples its degrees of freedom 0 and 2 with the others, nor the odd entries of its readings with them.
+    /// Removes all coupling of degrees of freedom 0 and 2 with the others; odd entries of a reading
+    /// then depend on the others alone.
     fn uncoupled(mut self) -> Self {
         let (nv, ns) = (self.noise.q.len(), self.noise.r.len());
         let nx = 2 * nv;
@@ -109,8 +111,8 @@ impl Case {
         self
     }
 
-    /// A mass on a slide, its place read in each row, about a trajectory that stays at rest at 0. One column: a
-    /// force of one unit.
+    /// A mass on a slide, with its position read in each row, about a trajectory at rest at 0. The
+    /// one column is a unit force.
     fn slide(mass: f64, dt: f64, places: &[f64], noise: NoiseModel) -> Self {
         let rows = places.len();
         let row_b = [0.5 * dt * dt / mass, dt / mass];
@@ -156,7 +158,7 @@ impl Case {
         }
     }
 
-    /// Rows `range` as an episode of their own, which begins about the trajectory.
+    /// Returns rows `range` as an episode of their own, which begins on the trajectory.
     fn part(&self, range: std::ops::Range<usize>) -> Self {
         let (nv, ns, m) = (self.noise.q.len(), self.noise.r.len(), self.m);
         let nx = 2 * nv;
@@ -196,7 +198,8 @@ fn assert_same(got: f64, want: f64, what: &str) {
     );
 }
 
-/// One degree of freedom with two entries a row, two with three, and three of which one is apart from the others.
+/// One degree of freedom with two entries per row, two with three, and three of which one is
+/// uncoupled from the others.
 fn cases() -> [Case; 3] {
     [
         Case::random(1, 6, 2, 3),

@@ -1,21 +1,21 @@
-//! The recursions against the same normal distribution written down densely.
+//! The recursions compared with the same normal distribution, written as dense matrices.
 //!
-//! All that is uncertain is one vector `z` of independent normal numbers: the start, the force at the
-//! first row, what each row adds to the force, and each row's white and free forces. States, forces and
-//! readings are `L z + c`, so that conditioning on the readings is one linear solve.
+//! All unknowns form one vector `z` of independent normal numbers: the initial state, the force at
+//! the first row, the increment of the force in each row, and each row's white and free forces.
+//! States, forces and readings are `L z + c`, so conditioning on the readings is one linear solve.
 
 use super::*;
 
-/// The joint distribution of all states, forces and readings of a case, and what the readings make of it.
+/// The joint distribution of all states, forces and readings of a case, with its posterior.
 struct Dense {
-    /// Changes of the state: `L z + c`, one a row.
+    /// Changes of the state: `L z + c`, one per row.
     states: Vec<(DMatrix<f64>, DVector<f64>)>,
-    /// Forces `L z`, one a row, and white forces, one a step.
+    /// Forces `L z`, one per row, and white forces, one per step.
     forces: Vec<DMatrix<f64>>,
     whites: Vec<DMatrix<f64>>,
     /// Response of the readings to the columns, `readings x m`.
     columns: DMatrix<f64>,
-    /// Covariance of the readings, and what they differ from their mean.
+    /// Covariance of the readings, and their difference from their mean.
     covariance: DMatrix<f64>,
     surprise: DVector<f64>,
     /// Mean and covariance of `z` given the readings.
@@ -28,7 +28,8 @@ impl Dense {
         let (linear, noise, m) = (&case.linear, &case.noise, case.m);
         let (nv, ns, rows) = (noise.q.len(), noise.r.len(), linear.rows);
         let nx = 2 * nv;
-        // z: the start, the first force, and of each step what is added to the force, the white and the free force.
+        // z: the initial state, the first force, and for each step the increment of the force, the
+        // white force and the free force.
         let size = nx + nv + 3 * nv * (rows - 1);
         let mut prior = vec![0.0; size];
         prior[..nx].copy_from_slice(&case.start.variance);
@@ -102,7 +103,7 @@ impl Dense {
         }
     }
 
-    /// Up to `ln 2 pi` a reading.
+    /// Log-likelihood, up to a constant of `ln 2 pi` per reading.
     fn log_likelihood(&self) -> f64 {
         let factor = self.covariance.clone().cholesky().unwrap();
         let log_determinant: f64 = factor.l().diagonal().iter().map(|x| 2.0 * x.ln()).sum();

@@ -1,8 +1,9 @@
-//! Wide starts and fine readings in double precision.
+//! Wide priors of the initial state and precise readings in double precision.
 
 use super::*;
 
-/// A motion of some seconds whose place and speed are read finely, of which the start is known to a variance of `width`.
+/// A motion whose position and speed are read precisely, with a variance of `width` for the initial
+/// state.
 fn finely_read(width: f64) -> Case {
     let (dt, rows) = (0.002, 300);
     let noise = NoiseModel {
@@ -14,7 +15,7 @@ fn finely_read(width: f64) -> Case {
     let mut case = Case::slide(1.0, dt, &vec![0.0; rows], noise);
     let reading = |k: usize| {
         let phase = 3.0 * dt * k as f64;
-        // A tenth of a deviation of the noise, so that each row differs.
+        // A tenth of a standard deviation of the noise, so that each row differs.
         let off = 1e-6 * (k as f64 * 1.7).sin();
         [phase.sin() + off, 3.0 * phase.cos() + off]
     };
@@ -27,9 +28,10 @@ fn finely_read(width: f64) -> Case {
 
 #[test]
 fn a_wide_start_costs_the_logarithm_of_its_width_however_fine_the_readings() {
-    // As the width V grows, the likelihood tends to that of the readings after the first row: the first adds
-    // -ln V / 2 - (first state)^2 / 2 V for place and speed. Readings finer than the start by 1e22 in variance used to
-    // leave covariances that are not positive.
+    // As the width V grows, the likelihood tends to that of the readings after the first row. The
+    // first row adds -ln V / 2 - (first state)^2 / 2 V for position and speed. The readings are
+    // more precise than the initial state by 1e22 in variance, where rounding can make a covariance
+    // indefinite.
     let at = |width: f64| {
         let case = finely_read(width);
         let likelihood = log_likelihood(case.problem(), &case.noise);
@@ -48,8 +50,9 @@ fn a_wide_start_costs_the_logarithm_of_its_width_however_fine_the_readings() {
 
 #[test]
 fn a_wide_start_leaves_the_sums_of_fine_readings_right() {
-    // Symptom: squares of what readings leave were a thousand times too large with a start of 5 m, and their variance went to its bound.
-    // Cause: the first state was corrected from before its readings, a difference of numbers 1e12 times as large.
+    // A difference of numbers 1e12 times as large, as in correcting the first state from before its
+    // readings, makes the squared residuals a thousand times too large with an initial state within
+    // 5 m. The readings' variance then runs into its bound.
     for width in [25.0, 36.0, 100.0, 1e4] {
         let mut case = finely_read(width);
         let speeds = case.linear.residual.iter_mut().skip(1).step_by(2);

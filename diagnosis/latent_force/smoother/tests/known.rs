@@ -3,7 +3,7 @@
 use super::super::super::evidence::evidence;
 use super::*;
 
-/// Places of a mass that a constant force pushes from rest, every `dt`.
+/// Positions of a mass that a constant force pushes from rest, every `dt`.
 fn pushed(force: f64, mass: f64, dt: f64, rows: usize) -> Vec<f64> {
     let place = |k: usize| 0.5 * force / mass * (k as f64 * dt).powi(2);
     (0..rows).map(place).collect()
@@ -21,7 +21,7 @@ fn a_constant_force_that_the_model_lacks_is_what_is_smoothed() {
     let case = Case::slide(mass, dt, &pushed(force, mass, dt, 101), noise);
     let smoothed = smooth(case.problem(), &case.noise);
     for k in 0..100 {
-        // A variance of 100 N^2 draws the estimate towards 0, by far less than it is uncertain by.
+        // A variance of 100 N^2 pulls the estimate towards 0, by far less than its uncertainty.
         let deviation = smoothed.force_variance[k].sqrt();
         assert!(deviation < 0.02, "{deviation}");
         let error = smoothed.force[k] - force;
@@ -41,14 +41,14 @@ fn the_coefficient_of_a_constant_force_is_that_force() {
         r: vec![1e-10],
     };
     let mut case = Case::slide(mass, dt, &pushed(force, mass, dt, 101), noise);
-    // A column in units of a prior's deviation of 10 N.
+    // A column in units of a prior standard deviation of 10 N.
     case.linear
         .state_columns
         .iter_mut()
         .for_each(|x| *x *= unit);
     let found = regress(case.problem(), &case.noise, 1);
     let told = evidence(&found.gram, &found.moment, &[0], &[0.0], &[[-9.0, 9.0]]);
-    // The prior takes its share of the posterior's precision.
+    // The prior contributes its share of the posterior's precision.
     let share = 1.0 / (1.0 + found.gram[(0, 0)]);
     assert!(share < 1e-6, "{share}");
     let coefficient = unit * told.coefficients[0];
@@ -80,7 +80,8 @@ fn without_readings_nothing_is_learnt() {
 
 #[test]
 fn the_regression_is_the_same_over_more_rows_than_are_added_up_at_once() {
-    // The likelihood is quadratic in a coefficient: moving the readings by x moves it by b x - a x^2 / 2.
+    // The log-likelihood is quadratic in a coefficient: moving the readings by x changes it by b x
+    // - a x^2 / 2.
     let noise = NoiseModel {
         q: vec![0.5],
         tau: vec![0.3],

@@ -1,8 +1,9 @@
-//! What the sums for the noise model are: slopes of the likelihood, and steps of EM.
+//! The sums for the noise model: gradients of the likelihood, and steps of EM.
 
 use super::*;
 
-/// A mass that a correlated force pushes, with white force and noisy places; all deviations are 1 but that of readings.
+/// A mass under a correlated force, with a white force and noisy positions; all standard deviations
+/// are 1 except that of the readings.
 fn wandering() -> Case {
     let mut rng = asid_core::Streams::new(1).stream("wandering");
     // A sum of twelve uniform numbers has variance 1.
@@ -29,7 +30,8 @@ fn wandering() -> Case {
 
 #[test]
 fn the_sums_are_the_slopes_of_the_likelihood() {
-    // Fisher's identity: the slope in ln v of a variance is (sum of squares / v - their number) / 2.
+    // Fisher's identity: the derivative with respect to ln v of a variance is (sum of squares / v -
+    // their number) / 2.
     let case = wandering();
     let smoothed = smooth(case.problem(), &case.noise);
     let step = 1e-4_f64;
@@ -58,8 +60,8 @@ fn the_sums_are_the_slopes_of_the_likelihood() {
     assert!(near(force, by_force), "{force} {by_force}");
 }
 
-/// Expected squares of the force at the first row and of what each row adds to it, each relative to its
-/// share of `q`, for evenly spaced rows.
+/// Expected squares of the force at the first row and of its increment in each row, each relative
+/// to its share of `q`, for evenly spaced rows.
 fn scatter(smoothed: &Smoothed, rho: f64) -> f64 {
     let [later, earlier, product] = smoothed.sums.force[0];
     let first = smoothed.force[0].powi(2) + smoothed.force_variance[0];
@@ -84,7 +86,7 @@ fn expectation_maximisation_raises_the_likelihood() {
         let n = sums.steps;
         noise.white[0] = sums.white[0] / n;
         noise.r[0] = sums.reading[0][0] / sums.reading[0][1];
-        // Best `rho` of many, the present one among them, each with its best `q`.
+        // The best `rho` of a grid that includes the present one, each with its best `q`.
         let now = (-dt / noise.tau[0]).exp();
         let q = |rho: f64| scatter(&smoothed, rho) / (n + 1.0);
         let expected = |rho: f64| -0.5 * ((n + 1.0) * q(rho).ln() + n * (1.0 - rho * rho).ln());
@@ -95,7 +97,8 @@ fn expectation_maximisation_raises_the_likelihood() {
         noise.q[0] = q(rho);
         noise.tau[0] = -dt / rho.ln();
     }
-    // What made the data is likelier than where the search began, and the end is likelier than what made them.
+    // The true model is likelier than the one where the search began, and the end is likelier than
+    // the true one.
     let truth = NoiseModel {
         q: vec![1.0],
         tau: vec![0.5],
@@ -104,8 +107,9 @@ fn expectation_maximisation_raises_the_likelihood() {
     };
     let of_truth = log_likelihood(case.problem(), &truth);
     assert!(log_likelihood(case.problem(), &case.noise) < of_truth - 10.0);
-    // EM is slow along what the readings hardly tell apart: white force from force.
+    // EM converges slowly where the readings hardly separate two variances: the white force's from
+    // the correlated one's.
     assert!(before > of_truth - 2.0, "{before} {of_truth}");
-    // 300 readings tell their variance to some 10 %.
+    // 300 readings determine their variance to some 10 %.
     assert!((noise.r[0] / 1e-4).ln().abs() < 0.5, "{noise:?}");
 }
