@@ -1,5 +1,5 @@
-//! The course of an identification, whatever searches: draw, simulate, learn from
-//! the losses, and turn all that was simulated into a posterior.
+//! The procedure of an identification, for any search rule: draw, simulate, learn from the losses,
+//! and turn all simulations into a posterior.
 
 use asid_core::identify::{Assumptions, Identified};
 use asid_core::tracker::TrackerPrior;
@@ -11,27 +11,29 @@ use super::models;
 use super::sampling::{self, Samples, SamplingSettings};
 use crate::optimise::{Search, UpdateRule};
 
-/// Root mean square of the whitened residual, 1 for noise alone, above which a search is taken to have ended in a
-/// place where the likelihood is locally good: worlds whose step, contacts and servos are a little off leave 1.0
-/// to 1.4 (`docs/results.md`), and searches that ended wrong on the patches 2 to 7.
+/// Root mean square of the whitened residual (1 for noise alone) above which a search is taken to
+/// have ended in a local optimum.
+///
+/// Worlds whose step, contacts and servos are slightly off leave 1.0 to 1.4 (`docs/results.md`);
+/// searches that ended wrong on the patches leave 2 to 7.
 const LOST: f64 = 1.5;
 
-/// How long a search goes on.
+/// Budget of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
-    /// Refits.
+    /// Refits of the search distribution.
     pub iterations: usize,
-    /// Simulations a refit.
+    /// Simulations per refit.
     pub population: usize,
-    /// Searches anew at most, each of twice the population of the one before.
+    /// Maximum number of restarts, each with twice the population of the one before.
     pub restarts: usize,
 }
 
 impl Budget {
-    /// Checks that there is something to search with.
+    /// Checks that the budget suffices for a search.
     ///
     /// # Errors
-    /// [`Error::Config`] where there is not.
+    /// [`Error::Config`] where it does not.
     pub fn check(self) -> Result<()> {
         let Self {
             iterations,
@@ -50,17 +52,17 @@ impl Budget {
     }
 }
 
-/// An identification by a search: how long it goes on, what it assumes of the trackers, what follows it, and the
-/// rule that learns from its draws.
+/// An identification by a search: its budget, its assumptions about the trackers, the posterior
+/// sampling, and the rule that learns from its draws.
 #[derive(Clone, Copy, Debug)]
 pub struct Course<'a, R> {
-    /// How long the search goes on.
+    /// Budget of the search.
     pub budget: Budget,
-    /// Systematic errors of the trackers.
+    /// Prior of the trackers' systematic errors.
     pub tracker: TrackerPrior,
-    /// The posterior after the search.
+    /// How the posterior is sampled after the search.
     pub sampling: &'a SamplingSettings,
-    /// The rule.
+    /// The update rule of the search distribution.
     pub rule: &'a R,
 }
 
@@ -75,7 +77,7 @@ impl<R: UpdateRule> Course<'_, R> {
         self.sampling.check()
     }
 
-    /// What it assumes of the readings.
+    /// What it assumes about the readings.
     #[must_use]
     pub fn assumes(&self) -> Assumptions {
         Assumptions {
@@ -84,8 +86,8 @@ impl<R: UpdateRule> Course<'_, R> {
         }
     }
 
-    /// Searches by the rule from the whole prior on, then samples the posterior; [`beyond`] the prior's
-    /// ranges where it piles up at their ends.
+    /// Searches from the whole prior by the rule, then samples the posterior; goes [`beyond`] the
+    /// prior's ranges where the posterior piles up at their ends.
     ///
     /// Binary unknowns make several models, which are searched one by one and compared; see
     /// [`super::models`].
@@ -98,12 +100,14 @@ impl<R: UpdateRule> Course<'_, R> {
         })
     }
 
-    /// The same inside the ranges of the problem's unknowns. A search whose fit misses the readings by far begins anew with
-    /// more draws, as in IPOP-CMA-ES (Auger and Hansen 2005); the fit that misses least stands.
+    /// Identifies within the ranges of the problem's unknowns.
+    ///
+    /// A search whose residual exceeds [`LOST`] restarts with more draws, as in IPOP-CMA-ES (Auger
+    /// and Hansen 2005); the fit with the smallest residual stands.
     fn within(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
         let mut best = self.once(problem, episodes, 0)?;
         for restart in 1..=self.budget.restarts {
-            // At an end of a range the misfit is the range's.
+            // At an end of a range the range itself causes the misfit.
             let marginals = &best.posterior.marginals;
             if best.residual <= LOST || marginals.iter().any(|m| m.at_edge.is_some()) {
                 break;
@@ -120,7 +124,7 @@ impl<R: UpdateRule> Course<'_, R> {
         Ok(best)
     }
 
-    /// One search, of twice the draws of the one before, from streams of its own.
+    /// One search with `2^restart` times the population, on random streams of its own.
     fn once(
         &self,
         problem: &Problem<'_>,
@@ -141,7 +145,8 @@ impl<R: UpdateRule> Course<'_, R> {
             let n = likelihood.dimension();
             let mut search =
                 Search::new(self.rule.clone(), &vec![0.0; n], &vec![1.0; n], &low, &high);
-            // The same draws for every model: where the data tell nothing, so does the comparison.
+            // The same draws for every model, so that models which the data cannot distinguish
+            // compare as equal.
             let mut rng = problem.streams.indexed("identify", restart as u64);
             let mut samples = Samples::default();
             let mut iterations = Vec::new();

@@ -1,5 +1,5 @@
-//! The cross-entropy method (Rubinstein 1999): refit a normal distribution to
-//! the best of its own draws.
+//! The cross-entropy method (Rubinstein 1999): refits a normal distribution to the best of its own
+//! draws.
 
 use asid_core::Result;
 use schemars::JsonSchema;
@@ -8,15 +8,15 @@ use serde::{Deserialize, Serialize};
 use super::search::ranked;
 use super::{Gaussian, Search, UpdateRule, require};
 
-/// How the distribution follows its elite.
+/// How the search distribution follows its elite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CemSettings {
-    /// Share of the draws that are refitted to.
+    /// Share of the draws that the distribution is refitted to.
     pub elite_fraction: f64,
     /// Weight of the old distribution in the new one.
     pub smoothing: f64,
-    /// Deviations never fall below this fraction of their first value.
+    /// Smallest standard deviations, as a fraction of their initial values.
     pub min_std_fraction: f64,
 }
 
@@ -34,10 +34,10 @@ impl Default for CemSettings {
 pub type Cem = Search<CemSettings>;
 
 impl CemSettings {
-    /// Checks the settings; `key` is where they stand in a configuration.
+    /// Checks the settings; `key` is their place in a configuration.
     ///
     /// # Errors
-    /// When one is out of its domain.
+    /// When a setting is out of its domain.
     pub fn check(&self, key: &str) -> Result<()> {
         let Self {
             elite_fraction: elite,
@@ -67,7 +67,7 @@ impl CemSettings {
 }
 
 impl UpdateRule for CemSettings {
-    /// Smallest deviations.
+    /// Smallest standard deviation of each entry.
     type Memory = Vec<f64>;
 
     fn begin(&self, first: &Gaussian) -> Vec<f64> {

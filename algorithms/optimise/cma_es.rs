@@ -1,10 +1,12 @@
-//! Covariance matrix adaptation (Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772):
-//! recombination of the better half, rank-one and rank-mu updates of the covariance, and the step
-//! size by the length of the path that the mean goes (cumulative step-size adaptation). Names and
-//! default constants are the tutorial's (table 1), weights of the worse half zero.
+//! Covariance matrix adaptation (Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772).
 //!
-//! The box is kept as its section B.5 has it at its simplest: what falls outside is drawn again. An
-//! optimum on the edge is approached the more slowly the closer the mean is.
+//! It recombines the better half of the draws, applies rank-one and rank-mu updates to the
+//! covariance, and sets the step size by the length of the mean's path (cumulative step-size
+//! adaptation). Names and default constants are the tutorial's (table 1), with zero weights for the
+//! worse half.
+//!
+//! The box is handled by the simplest method of the tutorial's section B.5: draws outside are drawn
+//! again. The closer the mean is to an optimum on the edge, the slower it approaches it.
 
 use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
@@ -15,11 +17,12 @@ use super::search::ranked;
 use super::{Gaussian, Search, UpdateRule, require};
 use crate::fisher::symmetric_eigen;
 
-/// How fast the covariance learns.
+/// How fast the covariance and the mean adapt.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
-    /// Factor on the rank-mu update's learning rate (`alpha_cov` in the tutorial; below 2 for noisy costs).
+    /// Factor on the rank-mu update's learning rate (`alpha_cov` in the tutorial); below 2 for
+    /// noisy costs.
     pub alpha_cov: f64,
     /// Learning rate of the mean; below 1 for noisy costs.
     pub c_m: f64,
@@ -34,21 +37,21 @@ impl Default for CmaEsSettings {
     }
 }
 
-/// A search by covariance matrix adaptation. `4 + 3 ln n` draws a refit suffice for `n` entries.
+/// A search by covariance matrix adaptation. `4 + 3 ln n` draws per refit suffice for `n` entries.
 pub type CmaEs = Search<CmaEsSettings>;
 
-/// What is remembered from one refit to the next.
+/// State that is kept from one refit to the next.
 #[derive(Clone, Debug)]
 pub struct Paths {
     /// Step size.
     sigma: f64,
     /// Covariance in units of the step size squared.
     covariance: DMatrix<f64>,
-    /// Conjugate path, whose length sets the step size.
+    /// Conjugate path; its length sets the step size.
     path_sigma: DVector<f64>,
-    /// Path, whose direction the rank-one update follows.
+    /// Evolution path; the rank-one update follows its direction.
     path_c: DVector<f64>,
-    /// Refits so far.
+    /// Number of refits so far.
     refits: i32,
 }
 
@@ -91,14 +94,14 @@ impl Strategy {
     }
 }
 
-/// Fewer draws that did not fail are no population: half of them must make a mean and a spread.
+/// Fewest draws that did not fail: half of them must determine a mean and a spread.
 const LEAST: usize = 4;
 
 impl CmaEsSettings {
-    /// Checks the settings; `key` is where they stand in a configuration.
+    /// Checks the settings; `key` is their place in a configuration.
     ///
     /// # Errors
-    /// When one is out of its domain.
+    /// When a setting is out of its domain.
     pub fn check(&self, key: &str) -> Result<()> {
         let Self { alpha_cov, c_m } = *self;
         require(
@@ -161,7 +164,8 @@ impl UpdateRule for CmaEsSettings {
             + root * &y * (s.c_sigma * (2.0 - s.c_sigma) * s.mu_eff).sqrt();
         let length = paths.path_sigma.norm();
         let settled = (1.0 - (1.0 - s.c_sigma).powi(paths.refits.saturating_mul(2))).sqrt();
-        // A path that is still long says that the step size lags; the rank-one update then waits.
+        // A path that is still long means that the step size is too small; the rank-one update then
+        // waits.
         let on = f64::from(u8::from(
             length / settled < (1.4 + 2.0 / (n as f64 + 1.0)) * s.chi,
         ));
@@ -176,8 +180,8 @@ impl UpdateRule for CmaEsSettings {
 
         let next_mean = mean + &y * (self.c_m * paths.sigma);
         let (low, high) = present.bounds();
-        // Where nothing tells draws apart the step size does a random walk: beyond the box's
-        // width nearly every draw falls outside and another says nothing new.
+        // Where the costs of all draws are alike, the step size does a random walk. Beyond the
+        // box's width nearly every draw falls outside, so more width has no effect.
         let widest = (0..n)
             .map(|i| (high[i] - low[i]) / covariance[(i, i)].sqrt())
             .fold(f64::INFINITY, f64::min);
@@ -189,7 +193,7 @@ impl UpdateRule for CmaEsSettings {
     }
 }
 
-/// `C^-1/2`; directions lost to rounding count as the best that a double resolves.
+/// `C^-1/2`; eigenvalues lost to rounding are raised to the smallest that a double resolves.
 fn inverse_root(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut eigen = symmetric_eigen(covariance.clone())?;
     let least = (eigen.eigenvalues.amax() * f64::EPSILON).max(f64::MIN_POSITIVE);
@@ -206,7 +210,7 @@ mod tests {
 
     const N: usize = 5;
 
-    /// Cost of the best draw, with the default population `4 + floor(3 ln 5)`.
+    /// Cost of the best draw with the default population `4 + floor(3 ln 5)`.
     fn best(refits: usize, cost: impl Fn(&[f64]) -> f64) -> f64 {
         let search = CmaEs::new(
             CmaEsSettings::default(),
@@ -220,14 +224,16 @@ mod tests {
 
     #[test]
     fn it_converges_on_a_sphere() {
-        // Log-linear: some 5 + n / 2 refits a decade of the cost (tutorial, section B.2).
+        // Log-linear convergence: some 5 + n / 2 refits per decade of the cost (tutorial, section
+        // B.2).
         let found = best(150, |x| ellipsoid(1.0, &[0.7, -1.2, 2.0, 0.1, -0.4], x));
         assert!(found < 1e-10, "{found}");
     }
 
     #[test]
     fn it_learns_the_axes_of_an_ellipsoid() {
-        // Condition 1e6: with independent entries of one size it would need a million draws.
+        // Condition number 1e6: with independent entries of equal size it would need a million
+        // draws.
         let found = best(500, |x| ellipsoid(1e6, &[0.7, -1.2, 2.0, 0.1, -0.4], x));
         assert!(found < 1e-8, "{found}");
     }
@@ -240,7 +246,8 @@ mod tests {
 
     #[test]
     fn strategy_parameters_are_the_tutorials() {
-        // n = 10, lambda = 10: mu_eff 3.167, as Hansen's purecma prints; c_1 = 2 / (11.3^2 + mu_eff).
+        // n = 10, lambda = 10: mu_eff 3.167, as Hansen's purecma prints; c_1 = 2 / (11.3^2 +
+        // mu_eff).
         let s = Strategy::new(10, 10, 2.0);
         assert!((s.mu_eff - 3.167).abs() < 1e-2, "{}", s.mu_eff);
         assert!((s.c_1 - 2.0 / (11.3_f64.powi(2) + s.mu_eff)).abs() < 1e-12);

@@ -1,11 +1,13 @@
-//! Bounded least squares by Gauss-Newton steps with Levenberg-Marquardt's damping, from several starts at
-//! once, for residuals that are known only by evaluating them, and rough.
+//! Bounded least squares by Gauss-Newton steps with Levenberg-Marquardt damping, from several
+//! starts at once. The residuals are rough, and only their values can be computed.
 //!
-//! An iteration is two batches: the points of central differences around every start, then steps of several
-//! dampings from each, of which the best is taken. Steps of the differences follow the deviations that the
-//! last fit left, so that they shrink with what is known and average what is rough. In the end
-//! a [`LocalFit`] over the region of the posterior gives estimate and information, as an
-//! identification by emulation does, with a straight line for its quadratic.
+//! An iteration evaluates two batches: the points of central differences around every start, then
+//! steps of several dampings from each, of which the best is taken. The difference steps follow the
+//! standard deviations that the last fit left: they shrink as the entries become known, and they
+//! average the roughness.
+//!
+//! At the end a [`LocalFit`] over the region of the posterior gives estimate and information.
+//! Identification by emulation does the same with a quadratic instead of a linear model.
 
 use crate::fisher::inverse_above_prior;
 use crate::fisher::local_fit::{LocalFit, Told, design, sets};
@@ -23,25 +25,27 @@ mod descent;
 /// Whitened residuals at many points: `None` where the evaluation failed.
 pub type Residuals<'r> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>> + 'r;
 
-/// How a search by Gauss-Newton goes on.
+/// Settings of a Gauss-Newton search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaussNewtonSettings {
-    /// Points of the box that are looked at for starts.
+    /// Points of the box that are evaluated to choose the starts.
     pub screened: usize,
-    /// Starts: the best of these points. Contact makes valleys beside the right one.
+    /// Number of starts: the best of these points. Several are needed since contact creates local
+    /// minima.
     pub starts: usize,
-    /// Most iterations from each start.
+    /// Maximum number of iterations from each start.
     pub iterations: usize,
-    /// First half step of the differences, in units of the entries (prior deviations).
+    /// Initial half step of the differences, in prior standard deviations.
     pub step: f64,
-    /// First damping, relative to the curvature.
+    /// Initial damping, relative to the curvature.
     pub damping: f64,
-    /// Fits over the region of the posterior, each narrower or wider as the one before says.
+    /// Fits over the region of the posterior; each narrows or widens the region of the next.
     pub rounds: usize,
-    /// Deviations of that region in units of the posterior's.
+    /// Standard deviations of that region in units of the posterior's.
     pub widen: f64,
-    /// Whether readings are weighed by how roughness runs along them, or by its size alone.
+    /// Whether readings are weighted by the whole covariance of the roughness along the episode, or
+    /// by its variance alone.
     pub correlated: bool,
 }
 
@@ -61,10 +65,10 @@ impl Default for GaussNewtonSettings {
 }
 
 impl GaussNewtonSettings {
-    /// Checks the settings; `key` is where they stand in a configuration.
+    /// Checks the settings; `key` is their place in a configuration.
     ///
     /// # Errors
-    /// When one is out of its domain.
+    /// When a setting is out of its domain.
     pub fn check(&self, key: &str) -> Result<()> {
         for (name, value) in [
             ("screened", self.screened),
@@ -90,7 +94,7 @@ impl GaussNewtonSettings {
         Ok(())
     }
 
-    /// Points that are evaluated in one batch at most, for `n` entries.
+    /// Largest number of points that are evaluated in one batch, for `n` entries.
     #[must_use]
     pub fn batch(&self, n: usize) -> usize {
         let differences = self.starts * (1 + 2 * n);
@@ -102,45 +106,47 @@ impl GaussNewtonSettings {
     }
 }
 
-/// Curvature that damping takes for granted where the residuals do not bend, in units of the entries.
+/// Curvature added in the damping, in units of the entries, so that it also acts where the
+/// residuals are flat.
 const FLAT: f64 = 1e-3;
 
-/// How far a step in the last fits may go, in half steps of the region: beyond the straight line says nothing.
+/// Longest step in the last fits, in half steps of the region: the linear model says nothing
+/// beyond.
 const REACH: f64 = 1.5;
 
-/// What to minimise over.
+/// The space to minimise over.
 #[derive(Clone, Copy, Debug)]
 pub struct Space<'s> {
     /// Smallest value of each entry.
     pub low: &'s [f64],
     /// Largest value of each entry.
     pub high: &'s [f64],
-    /// Leading entries that are unknowns; the others are estimated along.
+    /// Number of leading entries that are unknowns; the others are estimated jointly.
     pub sought: usize,
-    /// Residual entries that are present; the others are zero.
+    /// Number of residual entries that are present; the others are zero.
     pub readings: usize,
 }
 
-/// A minimum and what is known of it.
+/// A minimum, with its information.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Point with the smallest weighted sum of squares inside the box.
+    /// Point with the smallest weighted sum of squares within the box.
     pub point: Vec<f64>,
-    /// The same without the box: where the straight line has it, perhaps outside.
+    /// Minimum of the linear model without the box; it may lie outside.
     pub free: Vec<f64>,
-    /// Information about the entries, without any prior: roughness, its correlation, and what misfit
-    /// remains are in it.
+    /// Information about the entries, without any prior. It accounts for the roughness, its
+    /// correlation and the remaining misfit.
     pub information: DMatrix<f64>,
-    /// Root mean square of the residuals at the point, by the straight line.
+    /// Root mean square of the residuals at the point, by the linear model.
     pub residual: f64,
     /// Root mean square of the roughness, in units of the readings' noise.
     pub roughness: f64,
-    /// Half the smallest sum of squares seen after each iteration, and the points evaluated in it.
+    /// For each iteration: half the smallest sum of squares so far, and the points evaluated.
     pub course: Vec<(f64, Vec<Vec<f64>>)>,
 }
 
 impl Fit {
-    /// Information about the `sought` leading entries, the others projected out.
+    /// Information about the `sought` leading entries, with the others projected out.
     #[must_use]
     pub fn about(&self, sought: usize) -> DMatrix<f64> {
         let n = self.information.nrows();
@@ -165,7 +171,7 @@ impl Fit {
 /// Minimises the sum of squares; `None` where nearly every evaluation failed.
 ///
 /// # Errors
-/// As `residuals`.
+/// Those of `residuals`.
 pub fn minimise(
     settings: &GaussNewtonSettings,
     residuals: &mut Residuals<'_>,
@@ -210,7 +216,7 @@ fn gradient(fit: &LocalFit, told: &Told) -> DVector<f64> {
     fit.slopes() * weighed.transpose().column(0)
 }
 
-/// `-(H + damping diag H)^-1 g` over the entries that are not held.
+/// Step `-(H + damping diag H)^-1 g` over the entries that are not held.
 fn solve(curvature: &DMatrix<f64>, g: &DVector<f64>, damping: f64, held: &[bool]) -> Vec<f64> {
     let n = g.len();
     let mut left = curvature.clone();
@@ -228,7 +234,7 @@ fn solve(curvature: &DMatrix<f64>, g: &DVector<f64>, damping: f64, held: &[bool]
         .map_or_else(|| vec![0.0; n], |f| f.solve(&right).as_slice().to_vec())
 }
 
-/// Fits over the region of the posterior around where a start has arrived.
+/// Fits over the region of the posterior, around the point where a start converged.
 fn settle(
     settings: &GaussNewtonSettings,
     residuals: &mut Residuals<'_>,
@@ -259,7 +265,7 @@ fn settle(
             return Ok(found);
         };
         let (next, whole) = moved(&fit, &told, &point, &factor, space);
-        // What is left after the step, by the straight line.
+        // Residuals after the step, by the linear model.
         let step = DVector::from_fn(n, |i, _| next[i] - point[i]);
         let left = fit.middle() + fit.slopes().transpose() * step;
         let row = DMatrix::from_row_slice(1, left.len(), left.as_slice());
@@ -291,7 +297,7 @@ fn settle(
     Ok(found.map(|fit| Fit { course, ..fit }))
 }
 
-/// Where the straight line has its minimum: inside the box and within reach, and without either.
+/// Minimum of the linear model: inside the box and within reach, and without either limit.
 fn moved(
     fit: &LocalFit,
     told: &Told,
@@ -303,7 +309,8 @@ fn moved(
     let g = gradient(fit, told);
     let whole = solve(&told.curvature, &g, 0.0, &vec![false; n]);
     let free: Vec<f64> = (0..n).map(|i| point[i] + whole[i]).collect();
-    // Entries that would leave the box are held at its end one after the other, and the rest follows.
+    // Entries that would leave the box are held at its end one by one, and the others are solved
+    // for again.
     let mut held = vec![false; n];
     let mut step = whole;
     for _ in 0..n {

@@ -1,35 +1,35 @@
-//! A normal distribution with full covariance, cut to a box.
+//! A normal distribution with full covariance, truncated to a box.
 
 use asid_core::rng::Rng;
 use asid_core::{Error, Result};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
-/// Draws that fall outside the box are drawn again this often before they are clamped.
+/// How often a draw outside the box is drawn again before it is clamped.
 const REDRAWS: usize = 100;
 
-/// First ridge on a covariance that is not positive definite, in mean variances.
+/// Initial ridge on a covariance that is not positive definite, in units of the mean variance.
 const RIDGE: f64 = 1e-12;
 /// How often the ridge is raised tenfold: the last is a million times the mean variance, where any
 /// finite symmetric matrix is positive definite.
 const RAISES: usize = 18;
 
-/// `N(mean, covariance)` cut to `[low, high]`.
+/// `N(mean, covariance)` truncated to `[low, high]`.
 #[derive(Clone, Debug)]
 pub struct Gaussian {
     mean: DVector<f64>,
-    /// Lower triangular, `L L^T` is the covariance.
+    /// Lower triangular factor `L`; `L L^T` is the covariance.
     factor: DMatrix<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
 }
 
 impl Gaussian {
-    /// A normal distribution; the covariance is made positive definite by raising
-    /// its diagonal where it is not.
+    /// A normal distribution; where the covariance is not positive definite, its diagonal is
+    /// raised.
     ///
     /// # Errors
-    /// [`Error::Failed`] where an entry of mean or covariance is no finite number.
+    /// [`Error::Failed`] where an entry of mean or covariance is not finite.
     pub fn new(
         mean: DVector<f64>,
         covariance: DMatrix<f64>,
@@ -62,8 +62,8 @@ impl Gaussian {
         })
     }
 
-    /// Independent entries with these deviations; one that is no positive number counts for the
-    /// smallest positive number.
+    /// Independent entries with these standard deviations; one that is not positive is replaced by
+    /// the smallest positive number.
     #[must_use]
     pub fn diagonal(mean: &[f64], std: &[f64], low: &[f64], high: &[f64]) -> Self {
         let std = std.iter().map(|s| s.max(f64::MIN_POSITIVE));
@@ -75,11 +75,11 @@ impl Gaussian {
         }
     }
 
-    /// Weighted fit with the effective-size correction of the covariance,
-    /// `Z = sum d - sum d^2 / sum d`, and the deviations kept above `min_std`.
+    /// Weighted fit with the effective-size correction of the covariance, `Z = sum d - sum d^2 /
+    /// sum d`; standard deviations are kept above `min_std`.
     ///
     /// # Errors
-    /// As [`Gaussian::new`], such as where no point weighs anything.
+    /// As [`Gaussian::new`], for example where all weights are zero.
     pub fn fit(
         samples: &[Vec<f64>],
         weights: &[f64],
@@ -113,7 +113,7 @@ impl Gaussian {
         Self::new(mean, covariance, low, high)
     }
 
-    /// Independent entries with these deviations, in the same box.
+    /// Independent entries with these standard deviations, in the same box.
     #[must_use]
     pub fn with_diagonal(&self, mean: &[f64], std: &[f64]) -> Self {
         Self::diagonal(mean, std, &self.low, &self.high)
@@ -125,13 +125,13 @@ impl Gaussian {
         (&self.low, &self.high)
     }
 
-    /// Covariance before it was cut to the box.
+    /// Covariance before truncation to the box.
     #[must_use]
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.factor * self.factor.transpose()
     }
 
-    /// The mean before it was cut to the box.
+    /// Mean before truncation to the box.
     #[must_use]
     pub fn mean(&self) -> &[f64] {
         self.mean.as_slice()
@@ -146,7 +146,7 @@ impl Gaussian {
         }
     }
 
-    /// The same distribution with its deviations multiplied.
+    /// The same distribution with its standard deviations multiplied by `factor`.
     #[must_use]
     pub fn widened(&self, factor: f64) -> Self {
         Self {
@@ -155,14 +155,14 @@ impl Gaussian {
         }
     }
 
-    /// Standard deviations before it was cut to the box.
+    /// Standard deviations before truncation to the box.
     #[must_use]
     pub fn std(&self) -> Vec<f64> {
         let l = &self.factor;
         (0..self.mean.len()).map(|i| l.row(i).norm()).collect()
     }
 
-    /// Coordinates in which the distribution is a standard normal one.
+    /// Coordinates of `x` in which the distribution is a standard normal one.
     #[must_use]
     pub fn standardise(&self, x: &[f64]) -> Vec<f64> {
         let d = DVector::from_column_slice(x) - &self.mean;
@@ -180,7 +180,7 @@ impl Gaussian {
         x.as_slice().to_vec()
     }
 
-    /// A draw inside the box.
+    /// Draws a point inside the box.
     pub fn sample(&self, rng: &mut Rng) -> Vec<f64> {
         let n = self.mean.len();
         let mut x = DVector::zeros(n);
@@ -196,7 +196,7 @@ impl Gaussian {
             .collect()
     }
 
-    /// Log density of the uncut distribution.
+    /// Log density of the distribution without truncation.
     #[must_use]
     pub fn log_density(&self, x: &[f64]) -> f64 {
         let d = DVector::from_column_slice(x) - &self.mean;
@@ -256,14 +256,14 @@ mod tests {
         for (mean, variance) in [(0.0, f64::NAN), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
             assert!(of(mean, variance).is_err(), "{mean} {variance}");
         }
-        // Weights that are all zero have no mean.
+        // If all weights are zero there is no mean.
         let points = [vec![0.3], vec![0.4]];
         assert!(Gaussian::fit(&points, &[0.0; 2], &[0.1], &[0.0], &[1.0]).is_err());
     }
 
     #[test]
     fn a_covariance_that_is_not_positive_is_raised() {
-        // Entries that are alike, and one that is indefinite (eigenvalues 3 and -1).
+        // Two identical entries, and an indefinite matrix (eigenvalues 3 and -1).
         for rows in [[1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 2.0, 1.0]] {
             let covariance = DMatrix::from_row_slice(2, 2, &rows);
             let mean = DVector::from_vec(vec![0.0; 2]);

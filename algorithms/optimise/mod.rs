@@ -1,12 +1,12 @@
 //! Optimisers of a cost.
 //!
-//! [`Search`] is what `cem`, `reps` and `cma-es` have in common: a normal distribution inside a box, draws
-//! from it, and the best that was seen. How the distribution follows what its draws cost is the
-//! [`UpdateRule`], and all that tells one algorithm from another. [`gauss_newton`] minimises a sum of
-//! squares whose terms it sees.
+//! [`Search`] is the common part of `cem`, `reps` and `cma-es`: a normal distribution inside a box,
+//! draws from it, and the best draw so far. The [`UpdateRule`] says how the distribution follows
+//! the costs of its draws; the algorithms differ in nothing else. [`gauss_newton`] minimises a sum
+//! of squares from its single terms.
 //!
-//! They know nothing of simulators, so a whole population is one batch call of
-//! the caller's.
+//! The optimisers do not know about simulators: the caller evaluates a whole population in one
+//! batch.
 
 pub mod cem;
 pub mod cma_es;

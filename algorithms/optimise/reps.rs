@@ -1,10 +1,10 @@
-//! Relative entropy policy search (Peters, Mülling and Altün 2010), episodic form:
-//! reweight the draws by `exp(J / eta)`, with the temperature `eta` that bounds
-//! the step by `eps` in relative entropy, and refit.
+//! Relative entropy policy search (Peters, Mülling and Altün 2010), episodic form.
 //!
-//! With `J` a log-likelihood, `eta` is a temperature in the statistical sense too;
-//! it is then kept at 1 or above, where the draws of one step are weighted by the
-//! likelihood itself.
+//! It weights the draws by `exp(J / eta)` and refits. The temperature `eta` bounds the step by
+//! `eps` in relative entropy.
+//!
+//! If `J` is a log-likelihood, `eta` is also a temperature in the statistical sense. It is then
+//! kept at 1 or above; at 1 the draws of one step are weighted by the likelihood itself.
 
 use asid_core::Result;
 use schemars::JsonSchema;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Gaussian, Search, UpdateRule, require};
 
-/// How far one refit may go.
+/// How far one refit may move the distribution.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RepsSettings {
@@ -31,7 +31,7 @@ impl Default for RepsSettings {
     }
 }
 
-/// The dual `eta * eps + eta * log mean exp((J - max J) / eta) + max J`.
+/// The dual function `eta * eps + eta * log mean exp((J - max J) / eta) + max J`.
 #[must_use]
 pub fn dual(eta: f64, epsilon: f64, rewards: &[f64]) -> f64 {
     let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -64,18 +64,18 @@ pub fn temperature(epsilon: f64, rewards: &[f64]) -> f64 {
     ((a + b) / 2.0).exp()
 }
 
-/// A search by relative entropy policy search with full covariance. A cost is a negative reward.
+/// A search by relative entropy policy search with full covariance; a cost is a negative reward.
 pub type Reps = Search<RepsSettings>;
 
-/// Deviations never fall below this fraction of their first value: a thousandth of a prior's
-/// deviation is less than any posterior's of the tasks.
+/// Smallest standard deviation, as a fraction of its initial value: a thousandth of a prior's
+/// standard deviation is less than that of any posterior of the tasks.
 const MIN_STD: f64 = 1e-3;
 
 impl RepsSettings {
-    /// Checks the settings; `key` is where they stand in a configuration.
+    /// Checks the settings; `key` is their place in a configuration.
     ///
     /// # Errors
-    /// When one is out of its domain.
+    /// When a setting is out of its domain.
     pub fn check(&self, key: &str) -> Result<()> {
         let Self { epsilon, min_eta } = *self;
         require(epsilon > 0.0, &format!("{key}.epsilon"), epsilon, "above 0")?;
@@ -89,7 +89,7 @@ impl RepsSettings {
 }
 
 impl UpdateRule for RepsSettings {
-    /// Smallest deviations.
+    /// Smallest standard deviation of each entry.
     type Memory = Vec<f64>;
 
     fn begin(&self, first: &Gaussian) -> Vec<f64> {
@@ -129,7 +129,7 @@ mod tests {
         let max = 0.0;
         let w: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
         let total: f64 = w.iter().sum();
-        // KL of the reweighted from the uniform draws: sum p log(p n).
+        // KL divergence of the reweighted from the uniform draws: sum p log(p n).
         let kl: f64 = w
             .iter()
             .map(|w| w / total)

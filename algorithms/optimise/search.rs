@@ -1,19 +1,21 @@
-//! A search by draws from a normal distribution, whatever its update rule.
+//! A search by draws from a normal distribution, independent of its update rule.
 
 use asid_core::rng::Rng;
 
 use super::Gaussian;
 
-/// How a search distribution follows what its draws cost: all that tells one algorithm from another.
+/// How a search distribution follows the costs of its draws; the algorithms differ in nothing else.
 pub trait UpdateRule: Clone {
-    /// What the rule remembers from one refit to the next.
+    /// State that the rule keeps from one refit to the next.
     type Memory: Clone + std::fmt::Debug;
 
-    /// What is remembered of the first distribution.
+    /// The initial state, from the first distribution.
     fn begin(&self, first: &Gaussian) -> Self::Memory;
 
-    /// The next distribution, after draws of `present` with their costs: lower is better, and one
-    /// that is not finite says that the draw failed. `None` where they tell too little to refit.
+    /// The next distribution after draws from `present` with their costs; `None` where they are too
+    /// few to refit.
+    ///
+    /// Lower costs are better; a cost that is not finite marks a failed draw.
     fn update(
         &self,
         memory: &mut Self::Memory,
@@ -23,7 +25,7 @@ pub trait UpdateRule: Clone {
     ) -> Option<Gaussian>;
 }
 
-/// A search inside a box.
+/// A search inside a box, by an update rule.
 #[derive(Clone, Debug)]
 pub struct Search<R: UpdateRule> {
     rule: R,
@@ -56,7 +58,7 @@ impl<R: UpdateRule> Search<R> {
         (0..n).map(|_| self.distribution.sample(rng)).collect()
     }
 
-    /// Refits to candidates with their costs; those that are not finite count for failures.
+    /// Refits to candidates with their costs; a cost that is not finite marks a failure.
     pub fn tell(&mut self, candidates: &[Vec<f64>], costs: &[f64]) {
         for (candidate, &cost) in candidates.iter().zip(costs) {
             if cost.is_finite() && self.best.as_ref().is_none_or(|(_, c)| cost < *c) {
@@ -77,7 +79,7 @@ impl<R: UpdateRule> Search<R> {
         self.distribution.mean()
     }
 
-    /// Deviations of the distribution.
+    /// Standard deviations of the distribution.
     #[must_use]
     pub fn std(&self) -> Vec<f64> {
         self.distribution.std()
@@ -90,7 +92,7 @@ impl<R: UpdateRule> Search<R> {
     }
 }
 
-/// Indices of the costs, best first; what is not a number ranks with the failures, last.
+/// Indices of the costs, best first; NaN ranks last, with the failures.
 pub(super) fn ranked(costs: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     let rank = |c: f64| if c.is_nan() { f64::INFINITY } else { c };
@@ -100,12 +102,12 @@ pub(super) fn ranked(costs: &[f64]) -> Vec<usize> {
 
 #[cfg(test)]
 pub(super) mod known {
-    //! Costs whose minimum is known, and the search that all rules are asked to do.
+    //! Costs with a known minimum, and the search that all rules are tested with.
 
     use super::*;
     use asid_core::Streams;
 
-    /// `sum (x_i - t_i)^2`, each term stretched from 1 to `condition`.
+    /// `sum (x_i - t_i)^2`, with factors from 1 to `condition` on the terms.
     pub fn ellipsoid(condition: f64, target: &[f64], x: &[f64]) -> f64 {
         let last = (x.len() - 1).max(1) as f64;
         let terms = x.iter().zip(target).enumerate();
@@ -166,7 +168,7 @@ mod tests {
     fn every_rule_finds_a_bottom_at_the_edge_of_its_box() {
         fn edge<R: UpdateRule>(rule: R) {
             let search = Search::new(rule, &[0.0; 2], &[0.5; 2], &[-1.0; 2], &[1.0; 2]);
-            // The minimum without the box lies outside of it, at (2, 0.3).
+            // Without the box the minimum is at (2, 0.3), outside it.
             let bowl = |x: &[f64]| known::ellipsoid(1.0, &[2.0, 0.3], x);
             let found = known::searched(search, (60, 60), bowl);
             let mean = found.mean();

@@ -1,4 +1,4 @@
-//! The way down: starts are chosen, and each takes damped steps, all in the same batches.
+//! The descent: chooses starts and takes damped steps from each, all in the same batches.
 
 use crate::fisher::inverse_above_prior;
 use crate::fisher::local_fit::{LocalFit, Told};
@@ -8,27 +8,27 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{GaussNewtonSettings, Residuals, Space, clamp, gradient, half_squares, solve};
 
-/// Dampings that are tried at once, in units of the present one.
+/// Dampings that are tried at once, as factors on the present one.
 pub(super) const DAMPINGS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 
-/// A start has arrived once its step is below this share of the differences' steps.
+/// A start has converged once its step is below this share of the differences' steps.
 const ARRIVED: f64 = 0.01;
 
-/// Half steps of differences are never below this, in units of the entries: less is rounding where
-/// simulations hold six digits.
+/// Smallest half step of the differences, in units of the entries: below it rounding dominates
+/// where simulations hold six digits.
 const LEAST_STEP: f64 = 1e-3;
 
-/// One of the starts on its way.
+/// The state of one start's descent.
 pub(super) struct Walker {
     pub(super) point: Vec<f64>,
     pub(super) steps: Vec<f64>,
     pub(super) damping: f64,
     pub(super) loss: f64,
-    /// Whether it has arrived, or gets no further.
+    /// Whether it has converged or makes no further progress.
     pub(super) done: bool,
 }
 
-/// The best of points spread over the box: its middle, and draws.
+/// Evaluates points spread over the box (its middle and random draws); returns the best as starts.
 pub(super) fn screen(
     settings: &GaussNewtonSettings,
     residuals: &mut Residuals<'_>,
@@ -39,7 +39,7 @@ pub(super) fn screen(
     let n = space.low.len();
     let mut points = vec![vec![0.0; n]];
     while points.len() < settings.screened {
-        // Entries that are estimated along are sought around zero, one deviation to either side.
+        // Entries that are estimated jointly are drawn within one standard deviation of zero.
         let point = (0..n).map(|i| {
             let u: f64 = rng.random();
             if i < space.sought {
@@ -72,7 +72,7 @@ pub(super) fn screen(
     Ok((!walkers.is_empty()).then_some(walkers))
 }
 
-/// One step of every start that has not arrived; returns what was evaluated.
+/// Takes one step from every start that has not converged; returns the evaluated points.
 pub(super) fn iterate(
     settings: &GaussNewtonSettings,
     residuals: &mut Residuals<'_>,
@@ -121,7 +121,8 @@ pub(super) fn iterate(
         .zip(trials.chunks(DAMPINGS.len()))
     {
         let walker = &mut walkers[*i];
-        // Compared with the same weights: those of the readings around where it stands.
+        // All steps are compared with the same weights: those of the readings around the present
+        // point.
         let weighted = |row: &[f64]| {
             let row = DMatrix::from_row_slice(1, row.len(), row);
             0.5 * told.precision.weigh(&row).component_mul(&row).sum()
@@ -141,7 +142,8 @@ pub(super) fn iterate(
                 walker.loss = plain;
             }
             _ => {
-                // No step helps at any damping: as good as the luck of single points allows.
+                // No step helps at any damping: this is as good as the roughness of single points
+                // allows.
                 walker.damping *= DAMPINGS[DAMPINGS.len() - 1];
                 walker.done = walker.damping > 1e6;
             }
@@ -156,7 +158,7 @@ pub(super) fn iterate(
     Ok(seen)
 }
 
-/// The point and its central differences along the axes, inside the box.
+/// The point and its central differences along the axes, kept inside the box.
 fn differences(walker: &Walker, space: Space<'_>) -> Vec<Vec<f64>> {
     let mut points = vec![walker.point.clone()];
     for (j, step) in walker.steps.iter().enumerate() {
@@ -170,7 +172,7 @@ fn differences(walker: &Walker, space: Space<'_>) -> Vec<Vec<f64>> {
     points
 }
 
-/// A damped step; entries at an end of the box that the gradient pushes outwards stay.
+/// A damped step. Entries at an end of the box stay there while the gradient pushes outwards.
 fn damped(
     fit: &LocalFit,
     told: &Told,

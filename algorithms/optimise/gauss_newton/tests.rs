@@ -4,7 +4,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 const READINGS: usize = 120;
 
-/// A design of three entries, the last estimated along: readings are `A x + noise`.
+/// Design matrix of three entries, the last estimated jointly: readings are `A x + noise`.
 fn slopes() -> DMatrix<f64> {
     DMatrix::from_fn(READINGS, 3, |k, i| {
         let t = k as f64 / READINGS as f64;
@@ -75,8 +75,8 @@ fn the_covariance_is_that_of_estimates_over_draws_of_the_noise() {
                 .sum::<f64>()
                 / runs as f64;
             let scale = (wanted[(i, i)] * wanted[(j, j)]).sqrt();
-            // A covariance of 300 draws has a standard error of sqrt(2 / 300) = 8 % of the scale; misfit by
-            // chance, never counted below 1, adds some 5 % to what is said.
+            // A covariance of 300 draws has a standard error of sqrt(2 / 300) = 8 % of the scale.
+            // Misfit by chance, never counted below 1, adds some 5 % to the stated covariance.
             assert!(
                 (monte_carlo - wanted[(i, j)]).abs() < 0.25 * scale,
                 "{monte_carlo}"
@@ -98,7 +98,7 @@ fn the_covariance_is_that_of_estimates_over_draws_of_the_noise() {
 
 #[test]
 fn what_readings_do_not_see_has_no_information() {
-    // Only the sum of the two unknowns shows.
+    // The readings show only the sum of the two unknowns.
     let a = slopes();
     let (low, high) = ([-1.7; 3], [1.7; 3]);
     let observed = noise(3);
@@ -139,7 +139,8 @@ fn a_bent_valley_is_followed_to_its_end() {
 
 #[test]
 fn of_two_valleys_the_deeper_one_is_found() {
-    // Minima near -1 and 1; that at 1 is the better one, and the middle of the box leads to neither.
+    // Minima near -1 and 1; the one at 1 is the better one, and the middle of the box leads to
+    // neither.
     let (low, high) = ([-1.7], [1.7]);
     let fit = found(
         &GaussNewtonSettings::default(),
@@ -174,7 +175,7 @@ fn a_minimum_outside_is_met_at_the_edge() {
                 .collect()
         },
     );
-    // At the edge of the first entry the second follows it.
+    // With the first entry at the edge, the second follows it.
     assert!(
         (fit.point[0] - 1.0).abs() < 1e-6 && (fit.point[1] + 0.5).abs() < 1e-3,
         "{:?}",
@@ -185,8 +186,8 @@ fn a_minimum_outside_is_met_at_the_edge() {
 
 #[test]
 fn luck_widens_what_is_said_to_what_it_spreads() {
-    // One unknown of slope 1 in 120 readings, noise 1 and independent luck of 2 in every evaluation and in
-    // what was observed: a deviation of sqrt(5 / 120) = 0.2.
+    // One unknown of slope 1 in 120 readings, noise 1, and independent roughness of 2 in every
+    // evaluation and in the observation: standard deviation sqrt(5 / 120) = 0.2.
     let (low, high) = ([-1.7], [1.7]);
     let runs = 60;
     let fits: Vec<Fit> = (0..runs)
