@@ -1,8 +1,9 @@
-//! What the diagnosis is worth on the user's own machine: it is repeated on logs that are simulated in place of the real ones.
+//! Calibration of the diagnosis on the user's own machine: it is repeated on simulated logs.
 //!
-//! The model as identified, and with each of the leading explanations as fitted, plays the logs' own commands from their own
-//! starts; the sensors' noise is added, readings that the logs lack are left out, and the logs are diagnosed as the real ones
-//! were. How often each answer is right there is what its probability should be.
+//! The identified model, and that model with each of the leading explanations as fitted, simulates
+//! the logs' own commands from their own initial states. Sensor noise is added, and readings that
+//! the logs lack are left out. The simulated logs are then diagnosed as the real ones were. The
+//! probability of an answer should be how often it is right there.
 
 use asid_core::{Episode, Progress, Result, Streams};
 use rand_distr::StandardNormal;
@@ -18,10 +19,11 @@ use crate::study::Study;
 use crate::telling::Diagnosis;
 use crate::work::Work;
 
-/// Most explanations that are played, beside that without effects: each needs several runs.
+/// Maximum number of simulated explanations, besides the one without effects: each needs several
+/// runs.
 const WORLDS: usize = 4;
 
-/// Progress of a run within a calibration: it stops with the whole, and says nothing.
+/// Progress of a run within a calibration: silent, and stopped when the whole is.
 struct Within<'a>(&'a dyn Progress);
 
 impl Progress for Within<'_> {
@@ -33,7 +35,7 @@ impl Progress for Within<'_> {
     }
 }
 
-/// An answer: its kind, and the effects of a verdict that names some.
+/// An answer: its kind, with the effects that the verdict names.
 type Answer = (Kind, Vec<String>);
 
 fn answer(diagnosis: &Diagnosis) -> Answer {
@@ -43,7 +45,7 @@ fn answer(diagnosis: &Diagnosis) -> Answer {
     (verdict.kind, effects)
 }
 
-/// Turns a unit quaternion by a rotation vector.
+/// Rotates a unit quaternion by a small rotation vector in body axes.
 fn turned(q: &mut [f64], by: [f64; 3]) {
     let [w, x, y, z] = [1.0, 0.5 * by[0], 0.5 * by[1], 0.5 * by[2]];
     let [a, b, c, d] = [q[0], q[1], q[2], q[3]];
@@ -59,7 +61,7 @@ fn turned(q: &mut [f64], by: [f64; 3]) {
     }
 }
 
-/// An episode with other readings, noise added; what it lacks is lacking still.
+/// Returns an episode with other readings plus noise; readings that are missing stay missing.
 fn replaced(
     episode: &Episode,
     logs: &Logs,
@@ -100,7 +102,7 @@ fn replaced(
     other
 }
 
-/// A study whose logs an explanation has played; `None` where it diverges.
+/// Returns the study with logs that an explanation has simulated; `None` if it diverges.
 fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Result<Option<Study>> {
     let bench = &work.bench;
     let explanation = found.map_or(&work.findings.none, |f| &f.explanation);
@@ -129,13 +131,15 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
             *episode = replaced(episode, &record.logs, predicted, &mut random);
         }
     }
-    // Nothing is wrong with the wiring of logs that were simulated.
+    // Simulated logs have no wiring errors.
     study.wired = true;
     Ok(Some(study))
 }
 
-/// Probability that the real logs' answer is right, by Bayes' rule over the worlds that were played: how probable each is, times how often it
-/// gave that answer. `None` where none did.
+/// Returns the probability that the answer to the real logs is right, by Bayes' rule over the
+/// simulated worlds; `None` if none gave it.
+///
+/// The weight of a world is its probability times how often it gave that answer.
 fn probability(
     work: &Work,
     worlds: &[(Answer, Option<&Found>)],
@@ -172,7 +176,8 @@ pub fn calibrate(
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let hypotheses = work.judgement.hypotheses.iter();
-    // What is named and more is not played: what more there is would not be seen.
+    // Sets that contain the verdict and more are not simulated: the answer could not show what
+    // there is beyond it.
     let verdict = &work.judgement.best_explanation().labels;
     let is_more = |labels: &[String]| {
         !verdict.is_empty()
@@ -196,7 +201,7 @@ pub fn calibrate(
         })
         .collect();
     let [mut as_large, mut of_none] = [0.0; 2];
-    // Runs of each world that gave the real logs' answer.
+    // Number of runs of each world that gave the real logs' answer.
     let mut alike = vec![0.0; worlds.len()];
     let said = answer(diagnosis);
     progress.begin("calibrating", 0);
@@ -219,7 +224,7 @@ pub fn calibrate(
         settings.breadth.seed = seed;
         progress.note(&format!("run {}", run + 1));
         let (found, _) = diagnose_physics(&other, machine.clone(), settings, &Within(progress))?;
-        // One that was cut short is no answer.
+        // A run that was cut short gives no answer.
         if progress.is_stopped() {
             break;
         }

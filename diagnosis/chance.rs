@@ -1,23 +1,28 @@
-//! The evidence that chance alone does not reach.
+//! Threshold of evidence that chance alone does not reach.
 //!
-//! Where an effect does not act, the evidence for its one column is `z² g / (1 + g) / 2 - ln(1 + g) / 2` with `z` standard normal and `g` the
-//! column's information. How often that passes a threshold depends on `g`; the threshold here holds for the `g` at which it is passed most often.
+//! Where an effect does not act, the evidence for its one column is `z² g / (1 + g) / 2 - ln(1 + g)
+//! / 2`, with `z` standard normal and `g` the column's information. How often it exceeds a
+//! threshold depends on `g`. The threshold here holds for the `g` at which this happens most often.
 
-/// Steps of the bisections and of the search for the worst `g`: each halves an interval, or takes off a third.
+/// Number of steps of the bisections, each by a half, and of the search for the worst `g`, each by
+/// a third.
 const STEPS: usize = 80;
 
-/// Probability that a standard normal is further from zero than `z`, from above: Mills' ratio (Gordon 1941).
+/// Returns an upper bound of the probability that a standard normal is further from zero than `z`:
+/// Mills' ratio (Gordon 1941).
 fn tail(z: f64) -> f64 {
     2.0 * (-0.5 * z * z).exp() / (z * std::f64::consts::TAU.sqrt())
 }
 
-/// Square of the least deviation of `z` whose evidence passes `threshold`, at the worst information.
+/// Returns the square of the smallest `z` whose evidence exceeds `threshold`, at the worst
+/// information.
 fn least_square(threshold: f64) -> f64 {
     let square = |log: f64| {
         let g = log.exp();
         (2.0 * threshold + g.ln_1p()) * (1.0 + g) / g
     };
-    // Of one minimum: from next to no information to more than any log has.
+    // The function has one minimum. The interval reaches from nearly no information to more than
+    // any log has.
     let (mut low, mut high) = (-5.0, 40.0);
     for _ in 0..STEPS {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
@@ -30,11 +35,13 @@ fn least_square(threshold: f64) -> f64 {
     square(0.5 * (low + high))
 }
 
-/// Evidence, natural logarithm, that the best of `n` candidates of which none acts reaches with probability `rate` at most.
+/// Returns the evidence, a natural logarithm, that the best of `n` candidates exceeds with at most
+/// probability `rate` if none acts.
 #[must_use]
 pub fn threshold(n: usize, rate: f64) -> f64 {
     let each = rate / n.max(1) as f64;
-    // The odds themselves exceed 1 / p with probability p at most (Markov's inequality), so that the answer is below that.
+    // The odds themselves exceed 1 / p with at most probability p (Markov's inequality), which
+    // bounds the answer from above.
     let (mut low, mut high) = (0.0, -each.ln());
     for _ in 0..STEPS {
         let middle = 0.5 * (low + high);

@@ -1,12 +1,19 @@
-//! What a replay leaves of the logs held out beyond what their starts leave open.
+//! The misfit of replays to the held-out logs that no choice of initial states can remove.
 //!
-//! A start that was fitted on the first tenth of a log is known to some covariance, and a small error of it grows over the rest of the log.
-//! What counts is therefore what no start makes up for: the squared residuals of the whole log, with its start fitted to the whole of it, less those of
-//! its first tenth, with its start fitted to that. Where replays are linear in the start this is the squared Mahalanobis distance of the
-//! rest from its prediction, `r' (I + J S J')^-1 r` in units of the noise, with `J` the derivatives of the rest in the start and `S` the
-//! covariance of the start by the first tenth, and a step of Gauss and Newton or two from the start of the first tenth is all it takes. Replays that lie
-//! far from a log are not linear in it, and a slope there makes up for too much: where they do not keep what the slopes promise, the start is
-//! fitted to the log part by part.
+//! An initial state that was fitted on the first tenth of a log has some covariance, and a small
+//! error of it grows over the rest of the log. The misfit is therefore what no initial state makes
+//! up for. It is the squared residuals of the whole log, with the initial state fitted to all of
+//! it, less those of the first tenth, with the initial state fitted to that.
+//!
+//! Where replays are linear in the initial state, this is the squared Mahalanobis distance of the
+//! rest from its prediction, `r' (I + J S J')^-1 r` in units of the noise. `J` are the derivatives
+//! of the rest with respect to the initial state, `S` is the initial state's covariance from the
+//! first tenth. One or two Gauss-Newton steps from the initial state of the first tenth are then
+//! enough.
+//!
+//! Replays that lie far from a log are not linear in the initial state, and derivatives there
+//! promise too much. Where replays do not achieve what the derivatives predict, the initial state
+//! is fitted to the log part by part.
 
 mod linear;
 
@@ -21,21 +28,29 @@ use linear::linear;
 
 use super::{Bench, Explanation, Trial};
 
-/// Physics steps of all logs held out times open coordinates of their starts, beyond which starts count as known, for each is a replay: ten
-/// seconds of one core, in machines of many joints.
+/// Physics steps of all held-out logs times unknown coordinates, beyond which initial states count
+/// as known.
+///
+/// Each coordinate is a replay: ten seconds of one core, in machines of many joints.
 const AFFORDABLE: usize = 500_000;
-/// The same beyond which they are not fitted part by part, which takes each replay some thirty times.
+/// The same product, beyond which initial states are not fitted part by part, which takes some
+/// thirty times as many replays.
 const PART_BY_PART: usize = 100_000;
 
-/// Shares of the logs that starts are fitted to, one from where the one before has come to: a start that the first tenth leaves open by much may
-/// lead so far off the rest that no slope leads back from there.
+/// Shares of the logs to which initial states are fitted, each from the result of the one before.
+///
+/// If the first tenth leaves an initial state very uncertain, the replay may end so far from the
+/// rest of the log that no derivative leads back from there.
 const SHARES: [f64; 4] = [0.2, 0.4, 0.7, 1.0];
 
-/// An explanation, and its effects as trials.
+/// An explanation, with its effects as trials.
 pub type Explained<'a> = (&'a [Trial<'a>], &'a Explanation);
 
-/// Squared distances of the readings held out from those that explanations predict, in units of the noise, that no start of their logs makes up
-/// for; infinite where a replay diverges. Once it is late, slopes have to do.
+/// Returns for each explanation the squared distance of the held-out readings from their prediction
+/// that no initial state makes up for.
+///
+/// It is in units of the noise, and infinite where a replay diverges. Once `progress` is late, only
+/// derivatives are used.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -55,7 +70,7 @@ pub fn misfits(
     let mut left: Vec<f64> = by_slopes.iter().map(|l| l.cost).collect();
     if size <= PART_BY_PART && by_slopes.iter().any(|l| !l.is_kept) && !progress.is_late() {
         let fitted = part_by_part(bench, explained, progress)?;
-        // What one was fitted with time and the other without is no comparison.
+        // A fit that had enough time cannot be compared with one that had not.
         let fitted = fitted.into_iter().filter(|_| !progress.is_late());
         left.iter_mut().zip(fitted).for_each(|(l, f)| *l = l.min(f));
     }
@@ -70,8 +85,9 @@ pub fn misfits(
     left.into_iter().zip(explained).map(misfit).collect()
 }
 
-/// Squared residuals of the whole logs with their starts fitted part by part. A fit of starts may end in a valley of its own: each begins where the
-/// others have ended too.
+/// Returns the squared residuals of the whole logs with their initial states fitted part by part.
+///
+/// A fit may end in a local minimum. Each is therefore repeated from where the others have ended.
 fn part_by_part(
     bench: &Bench,
     explained: &[Explained<'_>],
@@ -94,14 +110,14 @@ fn part_by_part(
     explained.iter().enumerate().map(least).collect()
 }
 
-/// What a model with some effects has of unknowns, none of them free.
+/// Returns the unknowns of a model with some effects, all held.
 fn given(bench: &Bench, trials: &[Trial<'_>]) -> Vec<Unknown> {
     let mut unknowns = bench.unknowns(trials);
     unknowns.iter_mut().for_each(|u| u.free = false);
     unknowns
 }
 
-/// Fits the starts of the logs held out to some shares of them, one after the other.
+/// Fits the initial states of the held-out logs to increasing shares of the logs.
 fn fitted(
     bench: &Bench,
     (trials, of): &Explained<'_>,
@@ -131,7 +147,8 @@ fn fitted(
     found.ok_or_else(|| Error::Failed("there is no share of the logs to fit starts to".into()))
 }
 
-/// Squared residuals of the first tenth, from the starts that were fitted to it.
+/// Returns the squared residuals of the first tenth, from the initial states that were fitted to
+/// it.
 fn head(bench: &Bench, (trials, of): &Explained<'_>) -> Result<f64> {
     let point = Point {
         theta: of.fit.point.theta.clone(),

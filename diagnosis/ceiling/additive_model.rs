@@ -1,18 +1,23 @@
-//! Additive model of piecewise linear functions (Hastie and Tibshirani 1986), fitted by normal equations.
+//! Additive model of piecewise linear functions (Hastie and Tibshirani 1986), fitted by normal
+//! equations.
 //!
-//! Sums of the equations are kept part by part, so that each part is left out by a subtraction.
+//! The sums of the equations are stored part by part, so that a part is left out by subtraction.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::Course;
 
-/// Knots of the function of each variable, at quantiles of its values. Ten follow a law of friction about rest as well as
-/// the curve of a spring; more cost rows that short logs do not have.
+/// Number of knots of each variable's function, at quantiles of its values.
+///
+/// Ten follow a friction law about rest as well as the curve of a spring; more need rows that short
+/// logs do not have.
 const KNOTS: usize = 10;
-/// Precisions of the prior that are tried, relative to the mean square of a basis function times the rows: from next to none
-/// up to one that leaves a tenth of a law.
+/// Precisions of the prior that are tried, relative to the mean square of a basis function times
+/// the rows.
+///
+/// They reach from nearly none to one that leaves a tenth of a law.
 const PRIORS: [f64; 4] = [1e-4, 1e-2, 1.0, 10.0];
-/// Parts that a single episode is cut into, one of which is left out in turn.
+/// Number of parts of a single episode, each of which is left out in turn.
 const PARTS: usize = 4;
 
 /// Sums of one part of the rows: `X'X`, `X'y` and `y'y`.
@@ -23,7 +28,7 @@ pub(super) struct Sums {
     power: f64,
 }
 
-/// Values of the hat functions about `knots` at `x`: at most two differ from zero.
+/// Returns the values at `x` of the hat functions about `knots`, of which at most two are not zero.
 fn hats(knots: &[f64], x: f64) -> [(usize, f64); 2] {
     let last = knots.len() - 1;
     let above = knots.partition_point(|k| *k <= x);
@@ -38,7 +43,7 @@ fn hats(knots: &[f64], x: f64) -> [(usize, f64); 2] {
     [(above - 1, 1.0 - share), (above, share)]
 }
 
-/// Knots at quantiles of some values, each once.
+/// Returns knots at quantiles of some values, without duplicates.
 pub(super) fn knots(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<f64> = values.filter(|x| x.is_finite()).collect();
     if all.is_empty() {
@@ -51,7 +56,7 @@ pub(super) fn knots(values: impl Iterator<Item = f64>) -> Vec<f64> {
     knots
 }
 
-/// Sums of the parts of all episodes; the columns of each variable are those of its knots.
+/// Returns the sums of the parts of all episodes; each variable has one column per knot.
 pub(super) fn sums(courses: &[Course], knots: &[Vec<f64>]) -> Vec<Sums> {
     let width: usize = knots.iter().map(Vec::len).sum();
     let parts = if courses.len() > 1 { 1 } else { PARTS };
@@ -88,7 +93,8 @@ pub(super) fn sums(courses: &[Course], knots: &[Vec<f64>]) -> Vec<Sums> {
     all
 }
 
-/// Share of the power of parts left out in turn that the columns `which` foretell, at the best of the priors.
+/// Returns the share of power that the columns `which` predict, of parts left out in turn, with the
+/// best of the priors.
 pub(super) fn foretold(parts: &[Sums], which: &[usize]) -> f64 {
     let total: f64 = parts.iter().map(|p| p.power).sum();
     if total <= 0.0 || which.is_empty() {

@@ -1,4 +1,4 @@
-//! Identifiability: which of the study's parameters show in the logs, alone and beside each other.
+//! Identifiability: which of the study's parameters show in the logs, alone and together.
 
 use asid_core::Parameter;
 
@@ -8,11 +8,11 @@ use crate::fit::Fit;
 use crate::linearise::slope;
 use crate::result::CheckResult;
 
-/// Share of a parameter's range that its deviation must be below.
+/// Share of a parameter's range that its standard deviation must not exceed.
 const PINNED: f64 = 0.25;
 
-/// Does each of the study's parameters show, without effects or with those of the best
-/// explanation, and which of their combinations do not?
+/// Checks whether each of the study's parameters shows, without effects or with those of the best
+/// explanation, and which of their combinations do not.
 #[must_use]
 pub fn identifiability(
     parameters: &[Parameter],
@@ -28,14 +28,14 @@ pub fn identifiability(
     }
     let fit = &none.fit;
     let p = fit.free.len();
-    // In shares of the range.
+    // Per share of the range.
     let scale = |fit: &Fit, k: usize| {
         let i = fit.free[k];
         slope(&parameters[i], fit.point.theta[i]).abs()
     };
     let deviation = |k: usize| fit.covariance[(k, k)].max(0.0).sqrt() / scale(fit, k);
-    // Far off the logs a replay may be so chaotic that it has no slope; the best explanation is
-    // nearer.
+    // Far from the logs a replay may be so chaotic that it has no useful derivative. The best
+    // explanation is closer.
     let information = |k: usize| {
         let of = |fit: &Fit| fit.shows[k] * scale(fit, k);
         of(fit).max(of(&best.fit))
@@ -88,7 +88,7 @@ pub fn identifiability(
     all
 }
 
-/// The most correlated pair of parameters, where it is beyond 0.95.
+/// Describes the most correlated pair of parameters, if its correlation exceeds 0.95.
 fn correlated(parameters: &[Parameter], none: &Explanation) -> Option<String> {
     let c = &none.fit.covariance;
     let p = c.nrows();

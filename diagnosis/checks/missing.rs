@@ -4,10 +4,11 @@ use crate::data::Logs;
 
 use super::MISSING;
 
-/// Sensors and logs that are named at most; the rest is counted.
+/// Maximum number of named sensors and logs; the rest is only counted.
 const NAMED: usize = 4;
 
-/// The sensors of which more than a good share is missing in a log, with the log, most first; in words that follow others.
+/// Names the sensors that lack more than the accepted share of a log, with the log, largest share
+/// first; as the end of a sentence.
 #[must_use]
 pub(super) fn named(logs: [&Logs; 2]) -> String {
     let mut found: Vec<(f64, String)> = logs.into_iter().flat_map(lacking).collect();
@@ -24,7 +25,8 @@ pub(super) fn named(logs: [&Logs; 2]) -> String {
     format!(": {}", each.join(", "))
 }
 
-/// The sensors and logs of which more than a good share is missing, each with that share.
+/// Returns the sensors and logs with more than the accepted share of missing readings, each with
+/// that share.
 fn lacking(logs: &Logs) -> Vec<(f64, String)> {
     let (present, n) = (logs.present(), logs.entries.len());
     let mut found = Vec::new();

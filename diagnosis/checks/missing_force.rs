@@ -1,11 +1,12 @@
-//! What force the model lacks, and what short replays leave, before and with the verdict's effects.
+//! What force the model lacks, and what short replays leave unexplained, without and with the
+//! verdict's effects.
 
 use super::check;
 use crate::forces::{Missing, Short};
 use crate::result::{CheckResult, MissingForce};
 
-/// What short replays leave, and what forces the model lacks at its joints over them, before and
-/// with the verdict's effects.
+/// Describes what short replays leave unexplained, and what forces the model lacks at its joints
+/// over them, without and with the verdict's effects.
 #[must_use]
 pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> {
     const PLACES: [&str; 2] = [" in free motion", " in contact"];
@@ -33,7 +34,7 @@ pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> 
     let mut all = vec![check("windows", true, replays)];
     let joint = |(a, b): (&Missing, &Missing)| {
         let [mean, error] = a.against;
-        // Two digits of the error.
+        // Two significant digits of the error.
         let digits = (1.0 - error.abs().max(1e-9).log10().floor()).clamp(3.0, 9.0) as usize;
         format!(
             "{}{} {:.3} {} ({mean:.digits$} ± {error:.digits$} against the motion), of which {:.3} are left with the best explanation",
@@ -55,8 +56,8 @@ pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> 
     all
 }
 
-/// What force the model lacks at each degree of freedom, before and with the verdict's effects; none where it was not
-/// estimated.
+/// Describes what force the model lacks at each degree of freedom, without and with the verdict's
+/// effects; `None` where it was not estimated.
 #[must_use]
 pub fn missing_force(missing: &[MissingForce]) -> Option<CheckResult> {
     let one = |m: &MissingForce| {

@@ -1,4 +1,4 @@
-//! Units: a column in degrees or millimetres reads a usual factor times what the model has.
+//! Units: readings in degrees or millimetres are one of the usual factors times those of the model.
 
 use asid_core::Result;
 
@@ -8,16 +8,17 @@ use crate::predict::Point;
 use crate::prepare::plain_residuals;
 use crate::result::CheckResult;
 
-/// Logarithm of what a reading's size may be off by for a unit to be recognised.
+/// Largest logarithm of the ratio of a slope to a unit's factor for which the unit is recognised.
 const UNIT: f64 = 0.27;
 
-/// Readings in another unit: their slope over the predictions is one of the usual factors.
+/// Checks for readings in another unit: their slope over the predictions is one of the usual
+/// factors.
 ///
 /// # Errors
 /// When a rollout fails.
 pub fn units(bench: &Bench, nominal: &[f64]) -> Result<CheckResult> {
     let record = &bench.train;
-    // The model as given: a fit would have bent its parameters to the wrong unit.
+    // The model as given, because a fit would have adapted its parameters to the wrong unit.
     let point = Point {
         theta: nominal.to_vec(),
         starts: record.starts.clone(),

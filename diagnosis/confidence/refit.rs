@@ -1,6 +1,7 @@
-//! The confidence in a verdict, fitted to stored answers whose cause is known: a logistic regression of whether what is named is true.
+//! Refit of the confidence in a verdict to stored answers whose cause is known.
 //!
-//! The numbers that stand come from earlier worlds, and are the prior: a few worlds more move them a little.
+//! It is a logistic regression of whether what is named is true. The present coefficients come from
+//! earlier worlds and are the prior: a few more worlds change them a little.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -8,41 +9,43 @@ use crate::judgement::Claim;
 
 use super::{Confidence, sigmoid};
 
-/// Numbers that are fitted.
+/// Number of fitted coefficients.
 const N: usize = 5;
-/// Deviations of the prior about the numbers that stand: about what the answers that they were fitted to leave open of each.
+/// Standard deviations of the prior about the present coefficients: about what the answers to which
+/// they were fitted leave open.
 const PRIOR: [f64; N] = [0.4, 0.15, 0.5, 0.1, 0.6];
-/// Steps of Newton's method; a concave function of five numbers needs fewer.
+/// Maximum number of Newton steps; a concave function of five numbers needs fewer.
 const STEPS: usize = 50;
-/// Step that changes nothing.
+/// Norm of a step that changes nothing.
 const SMALLEST: f64 = 1e-9;
 
-/// A confidence that was fitted anew.
+/// Result of a refit.
 #[derive(Clone, Copy, Debug)]
 pub struct Refitted {
-    /// Verdicts that name something.
+    /// Number of verdicts that name something.
     pub verdicts: usize,
-    /// How many of them are true, or one is that the logs do not tell from them.
+    /// Number of them that are true, or that the logs do not distinguish from a true one.
     pub holds: usize,
-    /// Mean logarithm of the probability of what was so, by the numbers that stand.
+    /// Mean log score of the present coefficients: the logarithm of the probability of what was
+    /// true.
     pub log_score_before: f64,
-    /// The same by these.
+    /// Mean log score of the new coefficients.
     pub log_score: f64,
     /// `confidence.named`, `.evidence`, `.stopped`, `.gap_left`, `.more_laws`.
     pub numbers: [f64; N],
 }
 
-/// What each number is multiplied by.
+/// Returns the factors of the coefficients in the log odds.
 fn factors(claim: &Claim) -> SVector<f64, N> {
     SVector::from([1.0, claim.odds, -claim.stopped, -claim.left, -claim.more])
 }
 
-/// Probability that a claim holds.
+/// Returns the probability that a claim holds.
 fn probability(numbers: &SVector<f64, N>, claim: &Claim) -> f64 {
     sigmoid(numbers.dot(&factors(claim)))
 }
 
-/// Mean logarithm of the probability of what was so.
+/// Returns the mean logarithm of the probability of what was true.
 fn log_score(numbers: &SVector<f64, N>, claims: &[(Claim, bool)]) -> f64 {
     let each = claims.iter().map(|(claim, holds)| {
         let p = probability(numbers, claim);
@@ -51,7 +54,8 @@ fn log_score(numbers: &SVector<f64, N>, claims: &[(Claim, bool)]) -> f64 {
     each.sum::<f64>() / claims.len() as f64
 }
 
-/// The most probable numbers, given some claims and whether they hold; `None` without any.
+/// Returns the most probable coefficients, given some claims and whether they hold; `None` without
+/// claims.
 #[must_use]
 pub fn refit(standing: &Confidence, claims: &[(Claim, bool)]) -> Option<Refitted> {
     if claims.is_empty() {
@@ -73,7 +77,7 @@ pub fn refit(standing: &Confidence, claims: &[(Claim, bool)]) -> Option<Refitted
             slope += x * (f64::from(u8::from(*holds)) - p);
             curvature += x * x.transpose() * (p * (1.0 - p));
         }
-        // A whole step may go too far where all is improbable.
+        // A whole step may overshoot where everything is improbable.
         let mut step = curvature.cholesky()?.solve(&slope);
         while likelihood(&(numbers + step)) < likelihood(&numbers) && step.norm() > SMALLEST {
             step *= 0.5;
@@ -107,7 +111,7 @@ mod tests {
 
     #[test]
     fn many_answers_outweigh_the_numbers_that_stand() {
-        // Of pairs four in five hold, of what names one law nine in ten.
+        // Four in five pairs hold, and nine in ten of the verdicts that name one law.
         let of = |more: f64, n: usize, holds: usize| {
             (0..n).map(move |i| (Claim { more, ..CLAIM }, i < holds))
         };

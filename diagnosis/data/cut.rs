@@ -5,11 +5,12 @@ use asid_readings::replay::ReplayPlan;
 
 use super::{LoggedEpisode, Logs};
 
-/// Rows that a part of a log has at least, where the log has as many: fewer tell no speed.
+/// Fewest rows of a part of a log, if the log has as many: fewer do not determine a speed.
 const FEWEST: f64 = 6.0;
 
 impl Logs {
-    /// The same logs, each cut after a share of its rows, but not so short that no speed can be told.
+    /// Cuts each log after a share of its rows, but not so short that it does not determine a
+    /// speed.
     #[must_use]
     pub fn cut(&self, layout: &Layout, share: f64) -> Self {
         let mut logs = self.clone();
@@ -24,8 +25,9 @@ impl Logs {
         logs
     }
 
-    /// The logs cut into windows of `rows` rows, one after the other, each a log of its own; what
-    /// is left over at the end of an episode stays out unless it is half as long.
+    /// Cuts the logs into consecutive windows of `rows` rows, each a log of its own.
+    ///
+    /// The remainder at the end of an episode is left out unless it is at least half as long.
     #[must_use]
     pub fn windows(&self, layout: &Layout, rows: usize) -> Self {
         let width = self.width();
@@ -51,7 +53,7 @@ impl Logs {
         logs
     }
 
-    /// The same logs, replayed with another time step.
+    /// Plans the replays of the same logs with another time step.
     #[must_use]
     pub fn replanned(&self, layout: &Layout) -> Self {
         let mut logs = self.clone();

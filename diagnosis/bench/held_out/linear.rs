@@ -1,4 +1,4 @@
-//! Starts of the logs held out by the slopes of one linearisation.
+//! Initial states of the held-out logs from the derivatives of one linearisation.
 
 use asid_core::Result;
 use asid_core::progress::Silent;
@@ -12,23 +12,27 @@ use crate::predict::Point;
 
 use super::{Explained, given};
 
-/// Share of the cost that slopes promise, by which that of a replay may lie above it where replays count as linear in the start: a percent of the
-/// gap, which is told to no more.
+/// Relative excess of a replay's cost over the predicted one up to which replays count as linear in
+/// the initial state.
+///
+/// Two percent of the cost are one percent of the gap, which is reported to no more.
 const LINEAR: f64 = 0.02;
-/// Most steps: the second mends what curvature makes of the first, the third shows that nothing is left to mend.
+/// Maximum number of steps: the second corrects for the curvature of the first, the third shows
+/// that nothing is left to correct.
 const STEPS: usize = 3;
-/// Parts of a step of Gauss and Newton that are tried side by side.
+/// Parts of a Gauss-Newton step that are tried side by side.
 const PARTS: [f64; 3] = [1.0, 0.3, 0.1];
 
-/// What is left of the logs.
+/// Result of the steps.
 pub(super) struct Left {
     /// Squared residuals of the whole logs, in units of the noise.
     pub(super) cost: f64,
-    /// Whether that is the least which the slopes promise.
+    /// Whether that achieves the minimum which the derivatives predict.
     pub(super) is_kept: bool,
 }
 
-/// What an explanation leaves of the logs after steps of their starts by the slopes of one linearisation (a chord method).
+/// Takes Gauss-Newton steps of the initial states with the derivatives of one linearisation (a
+/// chord method), and returns the remaining cost.
 pub(super) fn linear(bench: &Bench, (trials, of): &Explained<'_>) -> Result<Left> {
     let mut point = Point {
         theta: of.fit.point.theta.clone(),
