@@ -1,12 +1,15 @@
 //! A start of the search that moves one drive after the other.
 //!
-//! Where all drives move at once at one size, the first that breaks a limit keeps all of them small. A joint that dry friction
-//! holds then never slips: its unknowns have no slope, and a search has nothing to follow. It slips where its command goes
-//! far, and keeps a limit of force or speed where it goes there slowly. So each drive in its turn gets curves of its own
-//! beside what those before it do: slow and fast, large and small, and slow ones to either side, since a joint may begin near one end of
-//! its range. The one that makes the objective smallest and keeps the
-//! limits stays; where none is better, the drive rests. The largest that keeps the limits says how far the search may move
-//! this drive.
+//! Where all drives move at once at one scale, the first that breaks a limit keeps all of them
+//! small. A joint that dry friction holds then never slips: its unknowns have no slope, and a
+//! search has nothing to follow. It slips where its command goes far, and keeps a limit of force or
+//! speed if the command is slow.
+//!
+//! Each drive in its turn therefore tries curves of its own, on top of the motion of the drives
+//! before it. They are slow and fast, large and small, and slow ones to either side, since a joint
+//! may begin near one end of its range. The curve with the smallest objective that keeps the limits
+//! stays; where none is better, the drive rests. The largest curve that keeps the limits defines
+//! how far the search may move this drive (its reach).
 
 use asid_core::error::Result;
 use asid_core::rng::Rng;
@@ -16,17 +19,19 @@ use crate::method::DesignSettings;
 use crate::motion::{Family, Shape};
 use crate::places::Places;
 
-/// Heights of a drive's curves, beside those of the search: one swing there and back, and two of them. A slow curve goes farthest
-/// before a limit of speed binds.
+/// Numbers of spline heights of a drive's slow curves: one swing there and back, and two of them.
+///
+/// They are tried beside a curve with the search's own number. A slow curve goes farthest before a
+/// speed limit binds.
 const SLOW: [usize; 2] = [2, 4];
 
-/// Ratio of neighbouring sizes of a drive's curve: the largest that keeps the limits is found to this.
+/// Ratio of neighbouring scales of a drive's curve; the largest that keeps limits is known to this.
 const RATIO: f64 = 0.6;
 
-/// Sizes of a drive's curve: from the whole down to a thirty-fifth.
+/// Number of scales of a drive's curve: from one down to a thirty-fifth.
 const SIZES: i32 = 8;
 
-/// Best curves of a drive that are looked at everywhere, at most.
+/// Most curves of a drive that are checked at all points.
 const LOOKS: usize = 6;
 
 /// Where a search begins.
@@ -35,12 +40,13 @@ pub(crate) struct Start {
     pub coefficients: Vec<f64>,
     /// Their cost.
     pub cost: f64,
-    /// For each coefficient, the largest size at which its drive's curve kept the limits beside the others, of 1.
+    /// Reach of each coefficient: the largest scale, of 1, at which its drive's curve kept the
+    /// limits.
     pub reach: Vec<f64>,
 }
 
 impl Designer<'_, '_> {
-    /// Moves one drive after the other, from all at rest.
+    /// Moves one drive after the other, starting with all at rest.
     ///
     /// # Errors
     /// When the engine fails.
@@ -79,7 +85,7 @@ impl Designer<'_, '_> {
             }
             let mut costs = self.candidates(&places.far).costs(&trials, 1)?;
             let found = self.best(&trials, &mut costs, (LOOKS, cost), places)?;
-            // Curves that keep the limits, whether they tell something or not.
+            // Curves that keep the limits, informative or not.
             let kept = sizes
                 .iter()
                 .zip(&costs)
@@ -97,7 +103,9 @@ impl Designer<'_, '_> {
         })
     }
 
-    /// Heights of a drive's curve of so many drawn knots, the largest of them 1 in magnitude.
+    /// A random drive's curve of `knots` heights, as heights of the search's spline.
+    ///
+    /// The largest has magnitude 1.
     fn curve(&self, knots: usize, rng: &mut Rng) -> Vec<f64> {
         let one = Family {
             base: vec![0.0],

@@ -1,8 +1,10 @@
-//! Intervals that are no narrower than the episodes disagree.
+//! Intervals that are at least as wide as the disagreement of the episodes.
 //!
-//! What a model lacks often pulls a value up in one episode and down in another one. Residuals within an episode are then alike, and
-//! least squares, which takes them for independent readings, is too sure. The variance of a sum of parts that are independent from one
-//! episode to the next is told by these parts alone (K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986, with episodes as clusters).
+//! An effect that a model lacks often pulls a value up in one episode and down in another.
+//! Residuals within an episode are then correlated. Least squares treats them as independent
+//! readings and is overconfident. The parts of a sum that are independent between episodes tell its
+//! variance without further assumptions (K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986, with
+//! episodes as clusters).
 
 use asid_core::error::Result;
 use asid_core::{Layout, Parameter};
@@ -11,22 +13,26 @@ use nalgebra::{DMatrix, DVector};
 use crate::dataset::{Dataset, Replayer};
 use crate::marginal::{marginal, values};
 
-/// Half width of the differences that slopes are taken by, in deviations of the fit: slopes over the region that the posterior covers.
+/// Half width of the differences for slopes, in posterior standard deviations of the fit.
+///
+/// The slopes then cover the region of the posterior.
 const STEP: f64 = 1.0;
-/// Least half width, in prior deviations: replays in double precision tell such a change from rounding.
+/// Smallest half width, in prior standard deviations: double precision resolves such a change.
 const LEAST_STEP: f64 = 1e-4;
-/// Most, in prior deviations: beyond it a replay is no straight line.
+/// Largest half width, in prior standard deviations: beyond it a replay is not linear.
 const MOST_STEP: f64 = 0.3;
 
-/// An episode's part of the normal equations.
+/// An episode's contribution to the normal equations.
 pub(crate) struct Part {
-    /// Slopes' products, `J^T J`.
+    /// Products of the slopes, `J^T J`.
     normal: DMatrix<f64>,
-    /// Slopes times residuals, `J^T r`.
+    /// Products of slopes and residuals, `J^T r`.
     gradient: DVector<f64>,
 }
 
-/// The parts of all episodes at a point, in prior deviations; none where a replay beside the point diverges.
+/// The contributions of all episodes at a point, in prior standard deviations.
+///
+/// Empty where a replay beside the point diverges.
 pub(crate) fn parts(
     replayer: &mut Replayer,
     layout: &Layout,
@@ -82,7 +88,9 @@ fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
         .map_or_else(|| DMatrix::identity(n, n), |c| c.inverse())
 }
 
-/// Information of which no deviation is smaller than the episodes disagree: correlations stay, deviations grow.
+/// Information whose standard deviations are at least the disagreement of the episodes.
+///
+/// Correlations stay; standard deviations grow.
 pub(crate) fn widened(information: &DMatrix<f64>, parts: &[Part]) -> DMatrix<f64> {
     let (n, count) = (information.nrows(), parts.len() as f64);
     if parts.len() < 2 {
@@ -106,7 +114,7 @@ pub(crate) fn widened(information: &DMatrix<f64>, parts: &[Part]) -> DMatrix<f64
 mod tests {
     use super::*;
 
-    /// Episodes that each read one value ten times with unit noise, off by these amounts from the fit.
+    /// Episodes that each read one value ten times with unit noise, offset by `off` from the fit.
     fn read(off: &[f64]) -> (DMatrix<f64>, Vec<Part>) {
         let part = |x: &f64| Part {
             normal: DMatrix::from_element(1, 1, 10.0),
@@ -121,7 +129,7 @@ mod tests {
         let off = [0.9, -1.1, 0.4, -0.2];
         let (information, parts) = read(&off);
         let wide = widened(&information, &parts);
-        // The standard error of a mean of four, the prior being of no weight.
+        // The standard error of a mean of four; the prior has no weight.
         let variance = off.iter().map(|x| x * x).sum::<f64>() / 3.0 / 4.0;
         assert!((wide[(0, 0)] * variance - 1.0).abs() < 0.05, "{wide}");
     }

@@ -1,8 +1,10 @@
-//! Costs of candidate motions, with no more plays than their order needs.
+//! Costs of candidate motions, with no more simulations than their ranking needs.
 //!
-//! A candidate is played at the middle of the unknowns; where it keeps the limits there, a step up and down in each unknown, for what it
-//! tells. In the order of that, candidates are played far from the middle too, with every physics step looked at, until as many
-//! keep the limits there as are wanted. The others keep their place behind these.
+//! A candidate is simulated at the middle of the unknowns. If it keeps the limits there, it is
+//! simulated a step up and down in each unknown, for its information. In the order of the resulting
+//! costs, candidates are then simulated far from the middle, with limits checked after every
+//! physics step, until enough of them keep the limits. The others keep their costs without that
+//! check.
 
 use asid_algorithms::fisher::Objective;
 use asid_core::Parameter;
@@ -13,36 +15,41 @@ use crate::motion::Family;
 use crate::play::{Played, Player};
 use crate::tells::{Told, of_plays, search_differences};
 
-/// Unknowns of whose ranges a search looks at all corners, at most: eight plays a candidate, where the ends are six.
+/// Most unknowns for which a search checks all corners of the ranges.
+///
+/// Eight plays for each candidate, where the ends are six.
 const FEW: usize = 3;
 
-/// A cost beyond any of a motion that keeps the limits.
+/// A cost beyond that of any motion that keeps the limits.
 pub const BROKEN: f64 = 1e6;
 
-/// What ranks candidates.
+/// Ranks candidates.
 pub struct Candidates<'p, 'a> {
-    /// Plays motions.
+    /// Simulates motions.
     pub player: &'p mut Player<'a>,
-    /// Motions.
+    /// The family of motions.
     pub family: Family,
     /// Unknowns, then nuisance entries.
     pub parameters: &'p [Parameter],
     /// Number of unknowns.
     pub sought: usize,
-    /// The middle: values about which is searched.
+    /// The middle: values of the parameters about which the search is done.
     pub values: &'p [f64],
-    /// What is known beside the prior, such as from logs.
+    /// Information beside the prior, such as from logs.
     pub known: &'p Told,
-    /// What is made small.
+    /// Objective that is minimised.
     pub objective: Objective,
-    /// Physics steps of a frame.
+    /// Physics steps in a frame.
     pub substeps: usize,
     /// Points far from the middle.
     pub far: &'p [Vec<f64>],
 }
 
 impl Candidates<'_, '_> {
-    /// Costs; the `wanted` lowest of them are of candidates that keep the limits everywhere, where so many do.
+    /// Costs of candidates.
+    ///
+    /// The `wanted` lowest costs belong to candidates that keep the limits everywhere, if that many
+    /// do.
     ///
     /// # Errors
     /// When the engine fails.
@@ -63,7 +70,7 @@ impl Candidates<'_, '_> {
                 costs[k] = told.and(1.0, self.known).cost(self.objective);
             }
         }
-        // In the order of what they tell, as many at a time as are still wanted.
+        // In the order of their costs, as many at a time as are still wanted.
         let mut order: Vec<usize> = keep.into_iter().filter(|&k| costs[k] < BROKEN).collect();
         order.sort_by(|&i, &j| costs[i].total_cmp(&costs[j]));
         let (mut found, mut rest) = (0, &order[..]);
@@ -83,13 +90,13 @@ impl Candidates<'_, '_> {
         Ok(costs)
     }
 
-    /// Commands of every physics step.
+    /// Commands for every physics step.
     fn fine(&self, commands: &[f64]) -> Vec<f64> {
         let rows = commands.chunks_exact(self.family.base.len());
         rows.flat_map(|row| row.repeat(self.substeps)).collect()
     }
 
-    /// Plays of the chosen motions, each at all points, in frames of some physics steps.
+    /// Plays of the chosen motions, each at all points, in frames of `substeps` physics steps.
     fn plays(
         &mut self,
         commands: &[Vec<f64>],
@@ -114,7 +121,7 @@ pub(crate) fn breaks(cost: f64) -> bool {
     cost >= BROKEN
 }
 
-/// Cost of plays that break limits; zero where all are kept.
+/// Cost of plays that break limits; zero where they keep all.
 fn broken(plays: &[Played]) -> f64 {
     let mut excess = Excess::default();
     plays.iter().for_each(|p| excess.join(&p.excess));
@@ -125,8 +132,9 @@ fn broken(plays: &[Played]) -> f64 {
     }
 }
 
-/// Points far from the middle at which a search begins to look at the limits: all corners of the ranges where these are few,
-/// else the ends of each range.
+/// Points far from the middle at which a search first checks the limits.
+///
+/// All corners of the ranges where these are few, else the ends of each range.
 pub fn far(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
     let n = parameters.len();
     if n > FEW {
@@ -139,7 +147,7 @@ pub fn far(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
     (0..1 << n).map(corner).collect()
 }
 
-/// The middle with each entry at either end of its range.
+/// The points that have one entry at an end of its range and the others at the middle.
 pub fn ends(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
     let mut points = Vec::with_capacity(2 * parameters.len());
     for (i, parameter) in parameters.iter().enumerate() {

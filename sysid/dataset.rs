@@ -1,4 +1,4 @@
-//! Logs made ready for comparison with replays of them.
+//! Logs prepared for comparison with their replays.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,14 +15,18 @@ use asid_readings::replay::Replay;
 
 use crate::{columns, start, targets};
 
-/// Smallest noise of a sensor, as a share of the spread of its readings: a simulated log has none at all.
+/// Smallest noise of a sensor, as a share of the spread of its readings.
+///
+/// A simulated log has no noise at all.
 const LEAST_NOISE: f64 = 1e-5;
 
 /// Entries of an orientation, `w x y z`.
 const QUATERNION: usize = 4;
 
-/// Memory that the replays of a batch are recorded in at most, bytes: 256 MiB. Readings at irregular times are interpolated between
-/// records of every physics step, which for 256 replays of a minute would be some gigabytes. Larger batches keep more cores busy.
+/// Most memory for the recorded replays of a batch, bytes: 256 MiB.
+///
+/// Readings at irregular times are interpolated between records of every physics step. For 256
+/// replays of a minute these would take several gigabytes. Larger batches keep more cores busy.
 const RECORDS: usize = 256 << 20;
 
 /// One episode.
@@ -34,17 +38,17 @@ pub struct Trial {
     pub episode: Episode,
     /// Readings of the compared sensors, `rows x width`, NaN where missing.
     pub readings: Vec<f64>,
-    /// Where it begins.
+    /// Initial state of the replay.
     pub start: InitialState,
-    /// Coordinates of the start that the log leaves open.
+    /// Coordinates of the initial state that the log leaves open.
     pub open: Vec<usize>,
     replay: Replay,
 }
 
-/// Episodes of one machine, and what of them is compared.
+/// Episodes of one machine, and the sensors that are compared.
 #[derive(Clone, Debug)]
 pub struct Dataset {
-    /// Sensors that some log has, with their noise.
+    /// Sensors that at least one log has, with their noise.
     pub signals: Vec<Signal>,
     /// Episodes.
     pub trials: Vec<Trial>,
@@ -103,13 +107,13 @@ impl Dataset {
         })
     }
 
-    /// Compared numbers of a row.
+    /// Number of residuals of a row.
     #[must_use]
     pub fn entries(&self) -> usize {
         self.differences.whitened_len()
     }
 
-    /// Compared numbers of an episode that are there.
+    /// Number of an episode's residuals for which a reading is present.
     pub(crate) fn present(&self, trial: &Trial) -> usize {
         let itself = self.residuals(trial, &trial.readings);
         itself.iter().filter(|x| x.is_finite()).count()
@@ -131,11 +135,13 @@ impl Dataset {
     }
 }
 
-/// A reading that is there, or an angle that follows from it: row, time (s) and value.
+/// A present reading, or an angle computed from it: row, time (s) and value.
 type Point = (usize, f64, f64);
 
-/// The noise of a sensor from the rough part of its readings: of each number, or of each rotation angle (rad) of an orientation.
-/// Readings that come in steps have at least the deviation of a step, `step / sqrt(12)`.
+/// Estimates the noise of a sensor from the high-frequency part of its readings.
+///
+/// The noise is that of each number, or of each rotation angle (rad) of an orientation. Readings
+/// that come in steps have at least the standard deviation of a step, `step / sqrt(12)`.
 fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
     let mut rough = ThirdDifferences::default();
     let mut step = f64::INFINITY;
@@ -174,7 +180,9 @@ fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
     rough.noise().deviation.max(least).max(step)
 }
 
-/// The readings of a column that are there. One that only repeats the one before, as of an encoder at rest, has no noise of its own.
+/// The present readings of a column, without repeats.
+///
+/// A reading that only repeats the one before, as of an encoder at rest, has no noise of its own.
 fn numbers(episode: &Episode, column: usize) -> Vec<Point> {
     let reading = |k: usize| episode.reading(k)[column];
     (0..episode.rows())
@@ -183,8 +191,11 @@ fn numbers(episode: &Episode, column: usize) -> Vec<Point> {
         .collect()
 }
 
-/// The angles (rad) about the three axes of the world that an orientation has turned by since its first reading: sums of the turns from
-/// one reading to the next, which are small however far it turns in all, and in which the sign of a quaternion means nothing.
+/// The angles (rad) about the world's three axes by which an orientation has turned since the
+/// start.
+///
+/// They are sums of the turns between readings, which are small however far it turns in all. The
+/// sign of a quaternion does not matter.
 fn turns(episode: &Episode, columns: &Range<usize>) -> [Vec<Point>; 3] {
     let mut series: [Vec<Point>; 3] = Default::default();
     let mut angles = [0.0; 3];
@@ -207,7 +218,7 @@ fn turns(episode: &Episode, columns: &Range<usize>) -> [Vec<Point>; 3] {
     series
 }
 
-/// Replays episodes at many values of the parameters at once.
+/// Replays episodes at many parameter values at once.
 pub struct Replayer {
     simulator: Box<dyn Simulator>,
     parameters: Vec<Parameter>,
@@ -240,7 +251,9 @@ impl Replayer {
         self.simulator.steps_taken()
     }
 
-    /// Residuals of one episode for some values of the parameters and starts; `None` where the simulation diverged.
+    /// Residuals of one episode for pairs of parameter values and initial states.
+    ///
+    /// `None` where the simulation diverged.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -279,7 +292,7 @@ impl Replayer {
     }
 }
 
-/// Replays at once, of at most `most`, that are recorded in `each` bytes.
+/// Number of replays to run at once, at most `most`, for records of `each` bytes.
 fn batch(most: usize, each: usize) -> usize {
     (RECORDS / each.max(1)).clamp(1, most.max(1))
 }
@@ -312,8 +325,9 @@ mod tests {
         ("log".into(), episode)
     }
 
-    /// A body that turns all the time, four times in all, read with a noise of 0.01 rad in each rotation angle; its quaternions come
-    /// with either sign.
+    /// Readings of a body that turns steadily, four turns in all.
+    ///
+    /// The noise is 0.01 rad in each rotation angle, and the quaternions come with either sign.
     fn turning(rows: usize) -> Vec<f64> {
         let mut rng = Streams::new(1).stream("t");
         let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
@@ -348,8 +362,10 @@ mod tests {
         assert!((found - 0.5 / 12.0_f64.sqrt()).abs() < 1e-12, "{found}");
     }
 
-    /// Symptom: gaps of an orientation twice as large as those of any other sensor. Cause: the noise was that of the numbers of a
-    /// quaternion, each of which changes by half of a rotation angle at most.
+    /// Symptom: residuals of an orientation twice as large as those of any other sensor.
+    ///
+    /// Cause: the noise was that of a quaternion's numbers, each of which changes by half of a
+    /// rotation angle at most.
     #[test]
     fn the_noise_of_an_orientation_is_that_of_its_angles() {
         let found = noise_of("q", &[log_of(4, turning(4000))]);
@@ -366,21 +382,25 @@ mod tests {
         assert!(found < 1e-4, "{found}");
     }
 
-    /// Symptom: a residual below one noise where a model explains the log as well as it can. Cause: an orientation counted as four
-    /// readings, one a number of its quaternion, but has three residuals.
+    /// Symptom: a residual below one noise where a model explains the log as well as it can.
+    ///
+    /// Cause: an orientation counted as four readings, one for each number of its quaternion, but
+    /// has three residuals.
     #[test]
     fn an_orientation_counts_as_three_readings() {
         let xml = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="0.1"/></body></worldbody>
             <sensor><framequat name="q" objtype="xbody" objname="b"/></sensor></mujoco>"#;
         let plant = Plant::of(&Scene::from_xml("s", xml, &[]).unwrap()).unwrap();
         let (name, mut episode) = log_of(4, turning(50));
-        // An orientation of which a number is missing is none.
+        // An orientation with a missing number is no reading.
         episode.readings[4 * 7 + 2] = f64::NAN;
         let data = Dataset::new(&plant, &[(name, episode)], &BTreeMap::new()).unwrap();
         assert_eq!(data.present(&data.trials[0]), 3 * 49);
     }
 
-    /// Symptom: a minute's log of irregular times took gigabytes. Cause: every replay of a batch of 256 was recorded at each physics step.
+    /// Symptom: a minute's log of irregular times took gigabytes.
+    ///
+    /// Cause: every replay of a batch of 256 was recorded at each physics step.
     #[test]
     fn a_batch_is_as_large_as_its_records_allow() {
         assert_eq!(batch(256, 8), 256);

@@ -1,8 +1,8 @@
-//! The search for the motion that tells the most and keeps all limits.
+//! The design of a motion that is most informative and keeps all limits.
 //!
-//! A method ([`crate::method`]) gives the coefficients of a motion: by a search, by a draw, or by a rule. The motion is then
-//! played at the middle, the ends and corners of the ranges, with the limits looked at after every physics step, and made
-//! smaller until none is broken.
+//! A method ([`crate::method`]) gives the coefficients of a motion: by a search, by a draw, or by a
+//! rule. The motion is then simulated at the middle, the ends and corners of the ranges. Limits are
+//! checked after every physics step, and the motion is scaled down until it keeps all of them.
 
 use asid_algorithms::fisher::Objective;
 use asid_core::error::{Error, Result};
@@ -18,61 +18,61 @@ use crate::motion::Family;
 use crate::play::{Played, Player};
 use crate::tells::Told;
 
-/// Factors by which a motion is made smaller to keep limits.
+/// Factor by which each attempt scales a motion down to keep limits.
 const SHRINK: f64 = 0.85;
 
-/// Times that it is made smaller at most: down to a thousandth.
+/// Most attempts: they scale down to a thousandth.
 const SHRINKS: usize = 43;
 
-/// How much larger the answer is played to see which limit it would break first.
+/// Factor by which the answer is enlarged to see which limit it would break first.
 const LARGER: f64 = 1.25;
 
-/// Corners of the ranges that the answer is played at, at most.
+/// Most corners of the ranges that the answer is checked at.
 const CORNERS: usize = 16;
 
-/// A motion that was found.
+/// A designed motion.
 #[derive(Clone, Debug)]
 pub struct Designed {
     /// Commands, `frames x nu`.
     pub commands: Vec<f64>,
-    /// What it tells.
+    /// Information of the motion.
     pub told: Told,
-    /// What slopes alone say that it tells: more where bodies touch ([`crate::expected`]).
+    /// Information by slopes alone: more where bodies touch ([`crate::expected`]).
     pub by_slopes: Told,
     /// Its play at the middle of the unknowns.
     pub played: Played,
-    /// By how much limits are passed at the worst of all points; nothing where they are kept.
+    /// Violations of limits over all checked points; none where they are kept.
     pub excess: Excess,
     /// The limit that a motion larger by a quarter would break.
     pub next_limit: Option<String>,
-    /// Factor that its largest motion was made smaller by.
+    /// Factor by which the method's motion was scaled down.
     pub scale: f64,
     /// Best cost after each round.
     pub course: Vec<f64>,
 }
 
-/// What a search works on.
+/// Input of a design.
 pub struct Designer<'p, 'a> {
-    /// Plays motions.
+    /// Simulates motions.
     pub player: &'p mut Player<'a>,
-    /// Motions.
+    /// The family of motions.
     pub family: Family,
     /// Unknowns, then nuisance entries.
     pub parameters: &'p [Parameter],
     /// Number of unknowns.
     pub sought: usize,
-    /// Values about which is searched.
+    /// Values of the parameters about which the motion is designed.
     pub values: Vec<f64>,
-    /// What is known beside the prior, such as from logs.
+    /// Information beside the prior, such as from logs.
     pub known: Told,
-    /// What is made small.
+    /// Objective that is minimised.
     pub objective: Objective,
-    /// Physics steps of a frame.
+    /// Physics steps in a frame.
     pub substeps: usize,
 }
 
 impl<'a> Designer<'_, 'a> {
-    /// Finds a motion.
+    /// Designs a motion.
     ///
     /// # Errors
     /// When nothing can move, or the engine fails.
@@ -104,7 +104,7 @@ impl<'a> Designer<'_, 'a> {
         self.finish(&coefficients, course, &points)
     }
 
-    /// What ranks candidates.
+    /// The ranking of candidates, with points `far` from the middle.
     pub(crate) fn candidates<'s>(&'s mut self, far: &'s [Vec<f64>]) -> Candidates<'s, 'a> {
         let family = self.family.clone();
         Candidates {
@@ -120,7 +120,7 @@ impl<'a> Designer<'_, 'a> {
         }
     }
 
-    /// The entries in which a point differs from the middle.
+    /// Describes the entries in which a point differs from the middle.
     fn words(&self, point: &[f64]) -> String {
         let entries = self.parameters.iter().zip(point).zip(&self.values);
         let moved = entries.filter(|((_, x), middle)| x != middle);
@@ -130,7 +130,7 @@ impl<'a> Designer<'_, 'a> {
         words.join(", ")
     }
 
-    /// Corners of the ranges: all of them where they are few, else draws.
+    /// Corners of the ranges: all of them where they are few, else random ones.
     fn corners(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = self.parameters.len();
         let few = n < usize::BITS as usize && 1 << n <= CORNERS;
@@ -146,7 +146,7 @@ impl<'a> Designer<'_, 'a> {
             .collect()
     }
 
-    /// By how much a motion passes limits at each of some points, with every physics step looked at.
+    /// Violations of a motion at each of some points, checked after every physics step.
     pub(crate) fn excess_at(
         &mut self,
         coefficients: &[f64],
@@ -164,7 +164,7 @@ impl<'a> Designer<'_, 'a> {
             .collect())
     }
 
-    /// Plays the answer with every step looked at, smaller and smaller until nothing is broken.
+    /// Scales the motion down until it keeps all limits, checked after every physics step.
     fn finish(
         &mut self,
         coefficients: &[f64],
@@ -173,7 +173,8 @@ impl<'a> Designer<'_, 'a> {
     ) -> Result<Designed> {
         let mut scale = 1.0;
         let mut excess = Excess::default();
-        // Where the last size broke the most: a size that breaks a limit there needs no look elsewhere.
+        // The point that the last size violated most: a size that fails there needs no check
+        // elsewhere.
         let mut worst = 0;
         for _ in 0..SHRINKS {
             excess = joined(&self.excess_at(coefficients, scale, &points[worst..=worst])?);
@@ -207,14 +208,14 @@ impl<'a> Designer<'_, 'a> {
     }
 }
 
-/// Excesses of several plays as one.
+/// Violations of several plays combined.
 pub(crate) fn joined(all: &[Excess]) -> Excess {
     let mut one = Excess::default();
     all.iter().for_each(|e| one.join(e));
     one
 }
 
-/// The place of the largest excess.
+/// Index of the largest violation.
 pub(crate) fn worst_of(all: &[Excess]) -> usize {
     (0..all.len())
         .max_by(|&i, &j| all[i].total.total_cmp(&all[j].total))

@@ -1,11 +1,14 @@
-//! What a motion is expected to tell, where bodies touch too.
+//! Expected information of a motion, valid where bodies make contact too.
 //!
-//! A contact that comes a time step earlier or later changes the readings about it by a jump, however short the step in the unknown
-//! is. Divided by that step the jump looks like information: the shorter the step, the more. No identification finds it, since
-//! beyond the jump the readings say nothing of where it is. So derivatives are taken twice, over a fixed step and over about the deviation
-//! that follows from it, which is how far an estimate is expected to be off. Where readings are smooth both are the same; a jump lies
-//! within one of the steps, or is divided by two different ones. So a reading counts only where its two derivatives agree, and then
-//! by the smaller of them.
+//! A contact that comes a time step earlier or later changes the readings by a jump, however short
+//! the difference step in the unknown is. Divided by that step the jump looks like information: the
+//! shorter the step, the more. No identification finds this information, since beyond the jump the
+//! readings do not tell where it is.
+//!
+//! Derivatives are therefore taken twice: over a fixed step, and over about the standard deviation
+//! that follows from it, which is the expected error of an estimate. Where readings are smooth both
+//! agree. A jump lies within only one of the steps, or is divided by two different ones. A reading
+//! therefore counts only where its two derivatives agree, and then by the smaller of them.
 
 use asid_core::Parameter;
 use asid_core::error::Result;
@@ -13,29 +16,31 @@ use asid_core::error::Result;
 use crate::play::{Played, Player};
 use crate::tells::{Told, derivatives, differences, differences_over};
 
-/// Shortest half step, in prior deviations: above the rounding of an engine.
+/// Shortest half step, in prior standard deviations: above the rounding of an engine.
 const SHORTEST: f64 = 1e-6;
 
-/// Longest half step, in prior deviations, over which most machines are about straight.
+/// Longest half step, in prior standard deviations: most machines are nearly linear over it.
 const LONGEST: f64 = 0.25;
 
-/// Ratio of two derivatives up to which they agree: what is smooth bends less over these steps.
+/// Ratio of two derivatives up to which they agree: smooth readings curve less over these steps.
 const AGREE: f64 = 2.0;
 
-/// What a motion is expected to tell.
+/// Expected information of a motion.
 #[derive(Clone, Debug)]
 pub struct Expected {
-    /// What both steps agree on.
+    /// Information on which both steps agree.
     pub told: Told,
-    /// What the slopes over the fixed step alone say.
+    /// Information by the slopes over the fixed step alone.
     pub by_slopes: Told,
     /// The play at the middle.
     pub played: Option<Played>,
 }
 
 impl Expected {
-    /// From plays of commands (`frames x nu`, frames of `substeps` physics steps) about `values` of the parameters, of which the first
-    /// `sought` are unknowns.
+    /// Simulates commands about `values` of the parameters, of which the first `sought` are
+    /// unknowns.
+    ///
+    /// Commands are `frames x nu`, with frames of `substeps` physics steps.
     ///
     /// # Errors
     /// When the engine fails.
@@ -68,7 +73,7 @@ impl Expected {
     }
 }
 
-/// Of two derivatives of each reading the smaller; zero where they disagree.
+/// The smaller of two derivatives of each reading; zero where they disagree.
 fn agreed(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let smaller = |(&x, &y): (&f64, &f64)| {
         if !(x.is_finite() && y.is_finite()) {
@@ -91,7 +96,8 @@ fn agreed(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
 mod tests {
     use super::*;
 
-    /// A reading with a slope of 3, and a jump of 1 between `-7e-3` and `7e-3`.
+    /// Difference quotient of a reading with a slope of 3 and a jump of 1 between `-7e-3` and
+    /// `7e-3`.
     fn derivative(step: f64) -> f64 {
         let jump = if step > 7e-3 { 1.0 } else { 0.0 };
         (2.0 * step * 3.0 + jump) / (2.0 * step)
@@ -100,12 +106,12 @@ mod tests {
     #[test]
     fn a_jump_is_no_information_and_a_slope_is() {
         let column = |step: f64| vec![vec![derivative(step), 3.0]];
-        // One step goes over the jump, the other does not.
+        // One step spans the jump, the other does not.
         let both = agreed(&column(0.02), &column(1e-3));
         assert_eq!(both[0], [0.0, 3.0]);
-        // Both go over it: what is divided by other steps is no slope.
+        // Both span it: a jump divided by different steps is no slope.
         assert_eq!(agreed(&column(0.25), &column(0.01))[0], [0.0, 3.0]);
-        // What is smooth is seen by both.
+        // Both see a smooth reading.
         assert!((agreed(&column(1e-3), &column(1e-4))[0][0] - 3.0).abs() < 1e-9);
     }
 

@@ -1,11 +1,12 @@
-//! The parameters of a study fitted to its logs: output-error identification over open-loop replays.
+//! Fits a study's parameters to its logs: output-error identification over open-loop replays.
 //!
-//! Residuals of replays are minimised by Gauss-Newton steps from several starts
-//! ([`asid_algorithms::optimise::gauss_newton`]). Initial states that a log leaves open are marginalised: with their
-//! slopes `S` and a wide prior, residuals have the covariance `1 + S S^T`, and are whitened by
-//! its root, `r - U (1 - (1 + σ²)^-1/2) U^T r` with `S = U σ V^T`. As the prior widens that is variable projection
-//! (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The slopes are taken anew where the fit has arrived. Where replays jump, as
-//! with contacts, the search goes on among the valleys of their loss.
+//! Gauss-Newton steps from several starts minimise the residuals of replays
+//! ([`asid_algorithms::optimise::gauss_newton`]). Initial states that a log leaves open are
+//! marginalised. With their sensitivities `S` and a wide prior, residuals have the covariance
+//! `1 + S S^T`. They are whitened by its root, `r - U (1 - (1 + σ²)^-1/2) U^T r` with
+//! `S = U σ V^T`. As the prior widens this becomes variable projection (G. Golub, V. Pereyra, SIAM
+//! J. Numer. Anal. 10, 1973). The sensitivities are computed anew at the point that the fit arrives
+//! at. Where replays jump, as with contacts, the search continues among the valleys of their loss.
 
 use asid_algorithms::identify::gauss_newton::posterior_of;
 use asid_algorithms::optimise::gauss_newton::{Fit, GaussNewtonSettings, Space, minimise};
@@ -19,34 +20,36 @@ use crate::dataset::{Dataset, Replayer};
 use crate::marginal::{marginal, values};
 use crate::valleys::{Watched, confirmed};
 
-/// Times that open starts and their slopes are found anew.
+/// Rounds, each of which computes open initial states and their sensitivities anew.
 const ROUNDS: usize = 3;
 
-/// Simulations of a batch at most: enough for all cores of a large machine, few enough for memory.
+/// Most simulations in a batch: enough for all cores of a large machine, few enough for memory.
 const BATCH: usize = 256;
 
-/// Half width of the box of a later round, in prior deviations beside the last round's point.
+/// Half width of a later round's box about the last round's point, in prior standard deviations.
 const NEAR: f64 = 0.7;
 
-/// Draws of the posterior: its quantiles are then good to 2 % of its width.
+/// Draws of the posterior: their quantiles are accurate to 2 % of its width.
 const DRAWS: usize = 4000;
 
-/// What a fit found.
+/// Result of a fit.
 pub struct Identified {
-    /// Values and what is known of them.
+    /// Posterior of the parameters.
     pub posterior: Posterior,
     /// The best values, in the parameters' units.
     pub values: Vec<f64>,
     /// Root mean square of the residuals there, in units of the noise.
     pub residual: f64,
-    /// Information about the parameters from the logs alone, in prior deviations.
+    /// Information about the parameters from the logs alone, in prior standard deviations.
     pub information: DMatrix<f64>,
     /// Physics steps of all replays.
     pub physics_steps: u64,
 }
 
-/// A search for machines whose replays are smooth in the unknowns, as they are where nothing bounces: from fewer
-/// points, and with fewer fits over the region of the posterior, than a task with contacts needs.
+/// Settings for machines whose replays are smooth in the unknowns, as where nothing bounces.
+///
+/// They need fewer starting points, and fewer fits over the region of the posterior, than a task
+/// with contacts.
 #[must_use]
 pub fn smooth() -> GaussNewtonSettings {
     GaussNewtonSettings {

@@ -1,7 +1,7 @@
-//! The gap of a model on logs: the root mean square of open-loop residuals, in units of the sensors' noise.
+//! The gap of a model on logs: root mean square of open-loop residuals, in units of the noise.
 //!
-//! A replay begins where the log says. What the log leaves open of it is fitted to the first tenth of the episode, which
-//! then does not count.
+//! A replay begins at the initial state of the log. Coordinates that the log leaves open are fitted
+//! to the first tenth of the episode, which then does not count.
 
 use asid_core::episode::InitialState;
 use asid_core::error::Result;
@@ -11,31 +11,34 @@ use nalgebra::{DMatrix, DVector};
 use crate::dataset::{Dataset, Replayer, Trial};
 use crate::start::moved;
 
-/// Share of an episode that an open start is fitted to.
+/// Share of an episode that an open initial state is fitted to.
 const WARM_UP: f64 = 0.1;
 
-/// Rows that it is fitted to at least: fewer tell no speed.
+/// Fewest rows that it is fitted to: fewer tell no speed.
 const WARM_UP_ROWS: usize = 6;
 
-/// Half steps of differences in a start: positions (rad or m) and velocities (rad/s or m/s), where trajectories
-/// are straight to 1e-4 and rounding is below 1e-8.
+/// Half steps of differences in an initial state, for positions and velocities.
+///
+/// They are in rad or m, and rad/s or m/s. Over them trajectories are linear to 1e-4, and rounding
+/// is below 1e-8.
 const STEPS: [f64; 2] = [1e-4, 1e-3];
 
-/// Standard deviation of an open coordinate beside what the first readings say, rad or m, rad/s or m/s: so wide
-/// that it only keeps what no reading sees.
+/// Prior standard deviation of an open coordinate about its value in the first readings.
+///
+/// In rad or m, rad/s or m/s. It is so wide that it only fixes what no reading sees.
 const PRIOR: f64 = 1.0;
 
-/// Gauss-Newton steps of a start; a start is near from the first readings.
+/// Gauss-Newton steps of an initial state; the first readings give a start nearby.
 const ITERATIONS: usize = 4;
 
-/// Lengths that a step of a start is tried with.
+/// Step lengths that are tried for each Gauss-Newton step.
 const LENGTHS: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
 
-/// Sensitivities of the residuals of an episode to its open start coordinates.
+/// Sensitivities of an episode's residuals to its open initial coordinates.
 pub struct StartSlopes {
-    /// `rows * entries x open`, zero where a reading is missing.
+    /// Derivatives, `rows * entries x open`; zero where a reading is missing.
     pub matrix: DMatrix<f64>,
-    /// Residuals at the start.
+    /// Residuals at the initial state.
     pub residuals: Vec<f64>,
 }
 
@@ -72,7 +75,7 @@ pub fn start_slopes(
     }))
 }
 
-/// Sum of squares of what is there.
+/// Sum of squares of the residuals that are present.
 fn squares(residuals: &[f64]) -> f64 {
     residuals
         .iter()
@@ -81,7 +84,7 @@ fn squares(residuals: &[f64]) -> f64 {
         .sum()
 }
 
-/// The start of an episode that fits its first `rows` rows best.
+/// The initial state of an episode that best fits its first `rows` rows.
 ///
 /// # Errors
 /// As [`Replayer::residuals`].
@@ -144,7 +147,7 @@ pub fn fit_start(
     Ok(start)
 }
 
-/// Rows of an episode that its open start is fitted to; none where nothing is open.
+/// Number of rows that an open initial state is fitted to; 0 where nothing is open.
 #[must_use]
 pub fn warm_up(trial: &Trial) -> usize {
     if trial.open.is_empty() {
@@ -156,17 +159,19 @@ pub fn warm_up(trial: &Trial) -> usize {
         .min(rows)
 }
 
-/// The gap of a model on some logs, with the residuals of each episode that count (`rows x entries`).
+/// The gap of a model on some logs.
 #[derive(Clone, Debug)]
 pub struct Gap {
-    /// Root mean square over all readings that count; infinite where a replay diverged, and not a number where none counts, as where
-    /// logs are no longer than what an open start is fitted to.
+    /// Root mean square over all readings that count; infinite where a replay diverged.
+    ///
+    /// It is NaN where no reading counts, as in logs that are no longer than the rows that an open
+    /// initial state is fitted to.
     pub value: f64,
-    /// One an episode; empty where it diverged.
+    /// Residuals of each episode that count (`rows x entries`); empty where it diverged.
     pub residuals: Vec<Vec<f64>>,
 }
 
-/// The gap at values of parameters.
+/// The gap at given parameter values.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
@@ -206,7 +211,7 @@ pub fn gap(
     })
 }
 
-/// Root of the mean of `count` squares, of which there is none of nothing: 0 would be a perfect replay.
+/// Root of the mean of `count` squares; NaN for none of them, since 0 would be a perfect replay.
 fn root_mean(sum: f64, count: usize) -> f64 {
     match count {
         0 if sum.is_finite() => f64::NAN,
@@ -214,7 +219,7 @@ fn root_mean(sum: f64, count: usize) -> f64 {
     }
 }
 
-/// What to say of logs in which no reading counts, such as `held out`.
+/// The message for logs in which no reading counts, such as `held out`.
 #[must_use]
 pub fn too_short(logs: &str) -> String {
     format!(
@@ -226,13 +231,14 @@ pub fn too_short(logs: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Symptom: a gap of 0.00 on logs of six rows, as if the model replayed them without fault. Cause: a start was fitted to all of them,
-    /// and the mean of no residual was 0.
+    /// Symptom: a gap of 0.00 on logs of six rows, as if the model replayed them perfectly.
+    ///
+    /// Cause: an initial state was fitted to all of them, and the mean of no residual was 0.
     #[test]
     fn a_log_that_is_all_warm_up_has_no_gap() {
         assert!(root_mean(0.0, 0).is_nan());
         assert_eq!(root_mean(8.0, 2), 2.0);
-        // A replay that diverged is told as such.
+        // A replay that diverged is reported as such.
         assert_eq!(root_mean(f64::INFINITY, 0), f64::INFINITY);
     }
 }

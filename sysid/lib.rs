@@ -1,13 +1,14 @@
-//! System identification of any machine that has a model: no task, no code.
+//! System identification of any machine that has a model, without a task and without code.
 //!
-//! A machine is its MJCF document, its unknowns are targets with ranges, its experience is logs. Two things are done
-//! with them:
+//! A machine is its MJCF document, its unknowns are targets with ranges, and its experience is
+//! logs. The crate does two things with them:
 //!
-//! - [`fit`]: the unknowns are fitted to logs by least squares over open-loop replays, with the initial states of the
-//!   episodes marginalised ([`dataset`], [`start`]), and the gap on logs held out is measured ([`gap`]).
-//! - [`design`]: a [`method`] gives the motion that tells the most about the unknowns ([`tells`], [`expected`]) and keeps all
-//!   [`limits`], searched among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
-//!   simulated true machines.
+//! - [`fit`] fits the unknowns to logs by least squares over open-loop replays, with the initial
+//!   states of the episodes marginalised ([`dataset`], [`start`]). [`gap`] measures the gap on logs
+//!   held out.
+//! - [`design`] finds the motion that tells the most about the unknowns ([`tells`], [`expected`])
+//!   and keeps all [`limits`]. A [`method`] searches it among [`candidates`]. It is a [`motion`] of
+//!   a few numbers, simulated in batches by [`play`], and [`rehearse`]d in simulated true machines.
 
 mod by_drive;
 mod by_episodes;
@@ -39,7 +40,7 @@ pub fn targets(parameters: &[Parameter]) -> Vec<Target> {
     parameters.iter().flat_map(|p| p.targets.clone()).collect()
 }
 
-/// The columns of one simulation at values of the parameters, in their units.
+/// The columns of one simulation at parameter values in their units.
 #[must_use]
 pub fn columns(parameters: &[Parameter], values: &[f64]) -> Vec<f64> {
     let pairs = parameters.iter().zip(values);

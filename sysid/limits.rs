@@ -1,8 +1,9 @@
-//! What a motion must keep on a real machine.
+//! Limits that a motion must keep on a real machine.
 //!
-//! Every limit is looked at in simulation, along whole trajectories: positions, speeds, forces of drives, places of bodies, contacts, and
-//! whether the machine comes to rest. A limit counts by how far it is passed in units of its own width, so that a
-//! search sees which of two motions that break something breaks it less.
+//! Every limit is checked in simulation, along whole trajectories: positions, speeds, forces of
+//! drives, positions of bodies, contacts, and whether the machine comes to rest. A violation is
+//! measured in units of the limit's own width. A search can then tell which of two motions violates
+//! limits less.
 
 use std::collections::BTreeMap;
 
@@ -10,34 +11,39 @@ use asid_core::error::{Error, Result};
 use asid_core::layout::JointKind;
 use asid_mjcf::Plant;
 
-/// Share of a joint's range that is kept free at either end: where a real machine's end stop may be.
+/// Share of a joint's range that is kept free at either end: a real machine may have its stop
+/// there.
 const END_MARGIN: f64 = 0.02;
 
-/// Share of a joint's range within which it counts as resting at the end of it, and by which it may then pass it: stops of a simulated
-/// machine give way by less (MuJoCo's default `solimp` lets them by a thousandth of a rad or m).
+/// Share of a joint's range within which it counts as resting at an end of the range.
+///
+/// It may also pass the end by this share. Stops of a simulated machine yield by less (MuJoCo's
+/// default `solimp` lets them yield by a thousandth of a rad or m).
 pub const STOP: f64 = 2e-3;
 
-/// Share of the command's range that is kept free likewise.
+/// Share of the command's range that is kept free at either end.
 const COMMAND_MARGIN: f64 = 0.0;
 
-/// Speed (rad/s or m/s) below which a joint is at rest where nothing else is said: an arm's encoder of 12 bits at 100 Hz
-/// reads no less.
+/// Default speed (rad/s or m/s) below which a joint is at rest.
+///
+/// It is the resolution of an arm's 12-bit encoder read at 100 Hz.
 pub const REST: f64 = 0.15;
 
-/// Limits as a user gives them, by name.
+/// Limits that a user requests, by name.
 #[derive(Clone, Debug, Default)]
 pub struct LimitRequest {
     /// Positions of joints, rad or m.
     pub position: BTreeMap<String, [f64; 2]>,
-    /// Speeds of joints, rad/s or m/s; under an empty name that of all others.
+    /// Speeds of joints, rad/s or m/s; the empty name stands for all others.
     pub speed: BTreeMap<String, f64>,
-    /// Forces of drives on their joints, N or N m, by actuator; under an empty name that of all others.
+    /// Forces of drives on their joints, N or N m, by actuator; the empty name stands for all
+    /// others.
     pub force: BTreeMap<String, f64>,
-    /// Boxes that the frames of bodies stay in: low and high corner, m, in the world's frame.
+    /// Boxes that contain the frames of bodies: low and high corner, m, in the world's frame.
     pub boxes: BTreeMap<String, [[f64; 3]; 2]>,
     /// Pairs of bodies that may touch.
     pub touch: Vec<[String; 2]>,
-    /// Speed at the end, rad/s or m/s; `None` where the machine need not come to rest.
+    /// Largest speed at the end, rad/s or m/s; `None` where the machine need not come to rest.
     pub rest: Option<f64>,
 }
 
@@ -46,21 +52,23 @@ pub struct LimitRequest {
 pub struct JointLimit {
     /// Name.
     pub name: String,
-    /// Place in `qpos`.
+    /// Index in `qpos`.
     pub qpos: usize,
-    /// Place in `qvel`.
+    /// Index in `qvel`.
     pub dof: usize,
     /// Range of positions, rad or m.
     pub position: Option<[f64; 2]>,
-    /// Ends of the joint's range in the model, rad or m, where `position` stays within them by a margin.
+    /// Ends of the joint's range in the model, rad or m, if `position` is that range less a margin.
     pub stops: Option<[f64; 2]>,
     /// Largest speed, rad/s or m/s.
     pub speed: Option<f64>,
 }
 
 impl JointLimit {
-    /// Lets the joint stay at `at` where that is an end of its range in the model or of its limit, and a hair beyond that end, as a stop
-    /// gives way; whether it is.
+    /// Lets the joint stay at `at` if that is an end of its range or limit; returns whether it is.
+    ///
+    /// The end is one of the joint's range in the model, or of its limit. The limit then moves
+    /// slightly beyond it, since stops yield.
     pub(crate) fn stay_at_stop(&mut self, at: f64) -> bool {
         let Some(limit) = &mut self.position else {
             return false;
@@ -88,7 +96,7 @@ pub struct DriveLimit {
     pub force: f64,
 }
 
-/// A box that a body's frame stays in.
+/// A box that must contain the origin of a body's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyBox {
     /// Name.
@@ -102,7 +110,7 @@ pub struct BodyBox {
 /// Limits of a machine.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Hinges and slides.
+    /// Limits of hinges and slides.
     pub joints: Vec<JointLimit>,
     /// Drives with a limit.
     pub drives: Vec<DriveLimit>,
@@ -112,15 +120,15 @@ pub struct Limits {
     pub boxes: Vec<BodyBox>,
     /// Pairs of bodies that must not touch.
     pub apart: Vec<[usize; 2]>,
-    /// Speed at the end, rad/s or m/s.
+    /// Largest speed at the end, rad/s or m/s.
     pub rest: Option<f64>,
 }
 
 impl Limits {
-    /// Limits of a machine: those asked for, and the ranges that its model has.
+    /// Limits of a machine: those requested, and the ranges of its model.
     ///
     /// # Errors
-    /// When a name is unknown, or a range is upside down.
+    /// When a name is unknown, or a low end is not below its high end.
     pub fn new(
         plant: &Plant,
         ranges: &dyn Fn(usize) -> Option<[f64; 2]>,
@@ -215,7 +223,7 @@ impl Limits {
     }
 }
 
-/// Pairs of bodies that can touch, each once, but for those that may.
+/// Pairs of bodies that can touch, each once, without those that are allowed to.
 fn pairs_apart(plant: &Plant, may_touch: &[[usize; 2]]) -> Vec<[usize; 2]> {
     let mut pairs: Vec<[usize; 2]> = plant
         .contacts
@@ -240,17 +248,17 @@ fn wrong(key: &str, message: String) -> Error {
     }
 }
 
-/// By how much limits are passed, in units of their own width; all zero where all are kept.
+/// Violations of limits, in units of their own width; zero where all are kept.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Excess {
-    /// Sum over frames and limits, a frame's share of the motion each.
+    /// Sum over frames and limits, each frame weighted by its share of the motion.
     pub total: f64,
-    /// The worst: what it is, and by how much.
+    /// The worst violation: a description, and its size.
     pub worst: Option<(String, f64)>,
 }
 
 impl Excess {
-    /// Takes in an excess in units of a limit's width, at one of `frames` frames.
+    /// Adds the violation of a limit, in units of its width, at one of `frames` frames.
     pub fn add(&mut self, excess: f64, frames: usize, what: impl FnOnce() -> String) {
         if excess.is_nan() || excess > 0.0 {
             let excess = if excess.is_nan() { DIVERGED } else { excess };
@@ -261,7 +269,7 @@ impl Excess {
         }
     }
 
-    /// Takes in another trajectory's.
+    /// Adds the violations of another trajectory.
     pub fn join(&mut self, other: &Self) {
         self.total += other.total;
         if let Some((what, excess)) = &other.worst
@@ -271,7 +279,7 @@ impl Excess {
         }
     }
 
-    /// The same, with where it is so.
+    /// The same violations, described with the point where they occur.
     #[must_use]
     pub fn at(&self, place: impl FnOnce() -> String) -> Self {
         let mut excess = self.clone();
@@ -291,5 +299,7 @@ impl Excess {
     }
 }
 
-/// What a simulation that diverged counts, in widths of a limit: more than any that merely breaks one.
+/// Violation that a diverged simulation counts as, in widths of a limit.
+///
+/// It exceeds that of a motion that merely breaks a limit.
 pub const DIVERGED: f64 = 1e3;

@@ -1,4 +1,4 @@
-//! The limits, looked at along a trajectory and in the posture that it begins in.
+//! Checks the limits along a trajectory and in its initial posture.
 
 use asid_core::error::Result;
 use asid_mjcf::plant::Drive;
@@ -8,8 +8,10 @@ use crate::limits::{DIVERGED, Excess};
 use crate::play::{Played, Player, TOUCH};
 
 impl Player<'_> {
-    /// Looks at the posture that motions begin in, at values of the parameters. A joint that rests at the end of its range there, a hair
-    /// within it or beyond it as a stop gives way, may go on doing so: the names of such joints, and by how much other limits are passed.
+    /// Checks the initial posture of motions, at parameter values.
+    ///
+    /// A joint that rests there at an end of its range (or a hair within or beyond it, as a stop
+    /// yields) may stay. Returns the names of such joints, and the violations of other limits.
     ///
     /// # Errors
     /// As [`Player::play`].
@@ -37,7 +39,7 @@ impl Player<'_> {
         Ok((at_stop, excess))
     }
 
-    /// The drives at values of the parameters.
+    /// The drives at parameter values.
     pub(crate) fn drives_at(&self, point: &[f64]) -> Vec<Option<Drive>> {
         let values = columns(&self.parameters, point);
         let mut drives = self.plant.drives.clone();
@@ -49,7 +51,7 @@ impl Player<'_> {
         drives
     }
 
-    /// One trajectory beside the limits.
+    /// Checks one trajectory against the limits.
     pub(crate) fn look(
         &self,
         rows: &[f64],
@@ -123,7 +125,7 @@ impl Player<'_> {
         }
     }
 
-    /// Forces of the drives under a row of commands.
+    /// Checks the forces of the drives under a row of commands.
     fn look_at_drives(
         &self,
         drives: &[Option<Drive>],
@@ -176,7 +178,7 @@ impl Player<'_> {
     }
 }
 
-/// A distance, rad or m, with the digits that it has.
+/// A distance, rad or m, with its significant digits.
 fn distance(x: f64) -> String {
     if x < 0.01 {
         format!("{x:.1e}")

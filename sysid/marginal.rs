@@ -1,4 +1,4 @@
-//! Residuals of an episode about the best start, whitened for what its log leaves open of it.
+//! Residuals of an episode about its best initial state, whitened for the coordinates left open.
 
 use asid_core::Parameter;
 use asid_core::episode::InitialState;
@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::dataset::{Dataset, Replayer, Trial};
 use crate::gap::{fit_start, start_slopes};
 
-/// Whitens residuals of an episode for what its start leaves open.
+/// Whitens residuals of an episode for the initial coordinates that its log leaves open.
 pub(crate) struct Marginal {
-    /// Where the episode begins.
+    /// Initial state of the replay.
     pub(crate) start: InitialState,
     basis: DMatrix<f64>,
     shrink: Vec<f64>,
@@ -36,7 +36,7 @@ impl Marginal {
     }
 }
 
-/// Values of parameters in their units, of a point in prior deviations.
+/// Parameter values in their units, at a point in prior standard deviations.
 pub(crate) fn values(parameters: &[Parameter], z: &[f64]) -> Vec<f64> {
     parameters
         .iter()
@@ -45,7 +45,7 @@ pub(crate) fn values(parameters: &[Parameter], z: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Finds the start of an episode at some values, and what it leaves open.
+/// Fits the initial state of an episode at parameter values, and whitens for its open coordinates.
 ///
 /// # Errors
 /// When the engine fails.

@@ -1,4 +1,4 @@
-//! Methods that find a motion, and how widely they search.
+//! Methods that find a motion, and their settings.
 
 use asid_core::error::{Error, Result};
 
@@ -7,18 +7,18 @@ use crate::motion::Shape;
 /// How a motion is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Fisher information by the cross-entropy method over splines.
+    /// Maximises Fisher information by the cross-entropy method over splines.
     FisherCem,
-    /// Spline heights that are drawn.
+    /// Random heights of splines.
     Random,
     /// A multisine with Schroeder's phases.
     Multisine,
-    /// A Fourier series whose coefficients are drawn.
+    /// A Fourier series with random coefficients.
     Fourier,
 }
 
 impl Method {
-    /// All, with their names on the command line.
+    /// All methods, with their names on the command line.
     pub const ALL: [(&'static str, Self); 4] = [
         ("fisher-cem", Self::FisherCem),
         ("random", Self::Random),
@@ -26,7 +26,7 @@ impl Method {
         ("fourier", Self::Fourier),
     ];
 
-    /// The method of a name.
+    /// The method with a name.
     ///
     /// # Errors
     /// When there is none.
@@ -48,7 +48,7 @@ impl Method {
         found.map_or("", |(n, _)| n)
     }
 
-    /// The curve that it moves.
+    /// Shape of the curves that it uses.
     #[must_use]
     pub fn shape(self, settings: &DesignSettings) -> Shape {
         match self {

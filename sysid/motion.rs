@@ -1,55 +1,59 @@
-//! Motions of a few numbers: commands over time that begin and end where the machine rests.
+//! Motions of a few numbers: commands over time that begin and end at the machine's rest.
 //!
-//! The command of an actuator is `base + amplitude · s(t)`, with `s` a smooth curve within `[-1, 1]` that is zero, with
-//! its slope, at the begin and the end. The curve is
+//! The command of an actuator is `base + amplitude · s(t)`. `s` is a smooth curve within `[-1, 1]`
+//! that is zero, with its slope, at the beginning and the end. The curve is
 //!
-//! - a cubic B-spline of some knots ([`Shape::Spline`]), or
-//! - a finite Fourier series under a window ([`Shape::Fourier`]; J. Swevers et al., "Optimal robot excitation and
-//!   identification", IEEE Trans. Robotics and Automation 13, 1997).
+//! - a cubic B-spline with some knots ([`Shape::Spline`]), or
+//! - a finite Fourier series under a window ([`Shape::Fourier`]; J. Swevers et al., "Optimal robot
+//!   excitation and identification", IEEE Trans. Robotics and Automation 13, 1997).
 //!
-//! It is divided by its own peak where that is above one, so that it stays smooth: only the range of a command cuts it.
-//! The coefficients, each within `[-1, 1]`, are what a search moves.
+//! It is divided by its own peak where that exceeds one, so that it stays smooth: only the range of
+//! a command clips it. A search optimises the coefficients, each within `[-1, 1]`.
 
 use asid_core::rng::Rng;
 use rand::Rng as _;
 
-/// How a curve is made of coefficients.
+/// How coefficients define a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Heights of this many cubic B-splines, evenly over the motion.
+    /// Heights of this many cubic B-splines, spread evenly over the motion.
     Spline(usize),
-    /// Cosine and sine parts of this many harmonics of the motion's length.
+    /// Cosine and sine coefficients of this many harmonics of the motion's duration.
     Fourier(usize),
 }
 
-/// Share of a Fourier motion over which it is faded in, and out.
+/// Share of a Fourier motion over which it fades in, and out.
 const FADE: f64 = 0.15;
 
-/// Height of a curve of splines of height one: where a cubic one peaks its neighbours have a quarter each.
+/// Peak of a curve of splines that all have height one.
+///
+/// Where a cubic spline peaks, its two neighbours have a quarter each.
 const OVERLAP: f64 = 1.5;
 
 /// A family of motions.
 #[derive(Clone, Debug)]
 pub struct Family {
-    /// The curve.
+    /// Shape of the curves.
     pub shape: Shape,
     /// Command of each actuator at rest.
     pub base: Vec<f64>,
-    /// Largest distance from it; 0 for an actuator that stays, infinite for one that only the limits of its joint bound
-    /// (`open_drives` finds how far it goes).
+    /// Largest distance of each command from its rest; 0 for an actuator that does not move.
+    ///
+    /// It is infinite for one that only the limits of its joint bound (`open_drives` finds its
+    /// size).
     pub amplitude: Vec<f64>,
     /// Range of each command.
     pub range: Vec<Option<[f64; 2]>>,
     /// Frames of the motion, without the rest at its end.
     pub frames: usize,
-    /// Frames at its end in which the commands rest.
+    /// Frames at the end during which the commands rest.
     pub rest: usize,
     /// Period of a frame, s.
     pub period: f64,
 }
 
 impl Family {
-    /// Coefficients of one actuator.
+    /// Number of coefficients of one actuator.
     pub(crate) fn each(&self) -> usize {
         match self.shape {
             Shape::Spline(knots) => knots,
@@ -57,7 +61,7 @@ impl Family {
         }
     }
 
-    /// Actuators that move.
+    /// Indices of the actuators that move.
     fn moving(&self) -> Vec<usize> {
         (0..self.base.len())
             .filter(|&a| self.amplitude[a] > 0.0)
@@ -70,13 +74,13 @@ impl Family {
         self.each() * self.moving().len()
     }
 
-    /// True where nothing moves.
+    /// Whether nothing moves.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Frames with the rest.
+    /// Frames of the motion and the rest.
     #[must_use]
     pub fn all_frames(&self) -> usize {
         self.frames + self.rest
@@ -100,12 +104,12 @@ impl Family {
         out
     }
 
-    /// Frame `k` as a share of the motion.
+    /// Time of frame `k`, as a share of the motion.
     fn time_of(&self, k: usize) -> f64 {
         k as f64 / self.frames as f64
     }
 
-    /// The curve at some shares of the motion, within `[-1, 1]` at each frame.
+    /// The curve at times `at` (shares of the motion), within `[-1, 1]` at each frame.
     fn curve(&self, coefficients: &[f64], at: &[f64]) -> Vec<f64> {
         let frames = (0..self.frames).map(|k| self.height(coefficients, self.time_of(k)).abs());
         let peak = frames.fold(1.0, f64::max);
@@ -114,11 +118,12 @@ impl Family {
             .collect()
     }
 
-    /// The height that coefficients sum up to at a share of the motion.
+    /// The curve before its peak is limited, at a share of the motion.
     fn height(&self, coefficients: &[f64], at: f64) -> f64 {
         match self.shape {
             Shape::Spline(knots) => {
-                // Splines whose support lies within the motion: the curve and its slope vanish at the ends.
+                // Each spline's support lies within the motion: the curve and its slope vanish at
+                // the ends.
                 let x = at * (knots + 3) as f64;
                 coefficients
                     .iter()
@@ -140,11 +145,11 @@ impl Family {
         }
     }
 
-    /// Heights of splines whose curves are near those of another family's coefficients; for a spline family.
+    /// Spline heights that approximate a curve of another family. For a spline family.
     #[must_use]
     pub fn near(&self, other: &Self, coefficients: &[f64]) -> Vec<f64> {
         let each = self.each();
-        // A spline of the support `[k, k + 4]` peaks in its middle.
+        // A spline with the support `[k, k + 4]` peaks in its middle.
         let middle: Vec<f64> = (0..each)
             .map(|k| (k + 2) as f64 / (each + 3) as f64)
             .collect();
@@ -154,15 +159,17 @@ impl Family {
             .collect()
     }
 
-    /// Coefficients that are drawn.
+    /// Random coefficients.
     pub fn random(&self, rng: &mut Rng) -> Vec<f64> {
         (0..self.len())
             .map(|_| rng.random_range(-1.0..1.0))
             .collect()
     }
 
-    /// A multisine of equal amplitudes with Schroeder's phases, which keep its peaks low, another order of harmonics for
-    /// each actuator (M. Schroeder, IEEE Trans. Information Theory 16, 1970). For a Fourier family.
+    /// A multisine of equal amplitudes with Schroeder's phases, which keep its peaks low.
+    ///
+    /// Each actuator has another order of the harmonics (M. Schroeder, IEEE Trans. Information
+    /// Theory 16, 1970). For a Fourier family.
     #[must_use]
     pub fn multisine(&self) -> Vec<f64> {
         let harmonics = self.each() / 2;
@@ -178,7 +185,7 @@ impl Family {
     }
 }
 
-/// The cubic B-spline with support `[0, 4]`, scaled so that it peaks at one.
+/// The cubic B-spline with support `[0, 4]`, scaled to a peak of one.
 fn cubic(x: f64) -> f64 {
     let part = |x: f64| x.max(0.0).powi(3);
     let value =
@@ -211,7 +218,7 @@ mod tests {
     fn a_spline_is_smooth_and_peaks_at_one() {
         assert!((cubic(2.0) - 1.0).abs() < 1e-12);
         assert!(cubic(0.0).abs() < 1e-12 && cubic(4.0).abs() < 1e-12);
-        // Continuous slope at a knot.
+        // The slope is continuous at a knot.
         let slope = |x: f64| (cubic(x + 1e-6) - cubic(x - 1e-6)) / 2e-6;
         assert!((slope(1.0 - 1e-5) - slope(1.0 + 1e-5)).abs() < 1e-3);
     }
@@ -226,7 +233,7 @@ mod tests {
             off += (a - b).powi(2);
             size += (a - 0.5).powi(2);
         }
-        // Heights in place of the curve itself flatten it where it turns sharply, by a tenth of its deviation.
+        // Sampled heights flatten sharp turns of the curve, by a tenth of its standard deviation.
         assert!(off < 0.03 * size, "{off} {size}");
     }
 
@@ -242,15 +249,17 @@ mod tests {
                 assert_eq!(row[1], 2.0);
             }
             let at = |k: usize| commands[2 * k];
-            // The slope at either end vanishes with the square of the time.
+            // Near either end the curve grows with the square of the time.
             assert!((at(0) - 0.5).abs() < 1e-9 && (at(1) - 0.5).abs() < 2e-2);
             assert!((at(199) - 0.5).abs() < 2e-2);
             assert!((200..210).all(|k| at(k) == 0.5));
         }
     }
 
-    /// Symptom: plateaus with corners in commands that are said to be smooth. Cause: curves above one were cut there. The second
-    /// differences of a curve whose slope is continuous fall by four where frames are twice as dense, those at a corner by two.
+    /// Symptom: plateaus with corners in commands that should be smooth.
+    ///
+    /// Cause: curves above one were clipped there. At twice the frame rate, the second differences
+    /// of a curve with a continuous slope fall by four, those at a corner by two.
     #[test]
     fn a_curve_above_one_is_no_plateau() {
         let loud = |shape| match shape {

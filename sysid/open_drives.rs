@@ -1,22 +1,26 @@
-//! How far the command of a drive goes that no range of commands, no range of a servo's joint and no limit of force bounds.
+//! How far a drive's command may go if only the limits of its joint bound it.
 //!
-//! Such a drive is bounded by the limits of its joint alone. It is played by itself, in one slow swing to one side, larger and larger,
-//! until a limit is broken: that size, with room for motions that swing there and back, is the largest that a search tries.
+//! Such a drive has no range of commands, no range of a servo's joint and no limit of force. It is
+//! simulated alone, in one slow swing to one side, larger and larger until a limit is broken. That
+//! size times a margin, since motions swing there and back, is the largest that a search tries.
 
 use asid_core::error::Result;
 
 use crate::design::Designer;
 use crate::motion::{Family, Shape};
 
-/// Sizes of the swing that are tried, as powers of two in the command's unit.
+/// Exponents of two of the swing's sizes, in the command's unit.
 const SIZES: std::ops::RangeInclusive<i32> = -10..=20;
 
-/// How much further a command may go than that of the slow swing that breaks a limit: a swing back and forth of a tenth of the time
-/// moves a mass a hundredth as far. What is too large, a search makes smaller.
+/// Factor by which a command may exceed that of the slow swing that breaks a limit.
+///
+/// A swing back and forth in a tenth of the time moves a mass a hundredth as far. A search reduces
+/// a size that is too large.
 const ROOM: f64 = 8.0;
 
 impl Designer<'_, '_> {
-    /// Replaces infinite amplitudes of the family by how far the drives may go; by 0 where no size breaks a limit.
+    /// Replaces infinite amplitudes of the family by the sizes found; by 0 where no size breaks a
+    /// limit.
     ///
     /// # Errors
     /// When the engine fails.
@@ -24,7 +28,7 @@ impl Designer<'_, '_> {
         let open: Vec<usize> = (0..self.family.amplitude.len())
             .filter(|&a| self.family.amplitude[a].is_infinite())
             .collect();
-        // Coming to rest is a question of the motion's shape.
+        // Whether the machine comes to rest depends on the motion's shape.
         let rest = self.player.limits.rest.take();
         let found: Result<Vec<f64>> = open.iter().map(|&a| self.reach_of(a)).collect();
         self.player.limits.rest = rest;
@@ -49,7 +53,7 @@ impl Designer<'_, '_> {
     }
 }
 
-/// Motions of one drive alone: a single swing to one side, over the whole time.
+/// The family of motions of one drive alone: a single swing to one side, over the whole time.
 fn swing_of(family: &Family, drive: usize) -> Family {
     let mut amplitude = vec![0.0; family.amplitude.len()];
     amplitude[drive] = 1.0;

@@ -1,4 +1,4 @@
-//! Points of the ranges at which a motion is looked at, and the best candidate that keeps its limits at all of them.
+//! Points of the ranges at which limits are checked, and the best candidate that keeps them there.
 
 use asid_core::error::Result;
 
@@ -6,17 +6,20 @@ use crate::candidates::{BROKEN, breaks};
 use crate::design::{Designer, joined, worst_of};
 use crate::limits::Excess;
 
-/// Points of the ranges at which limits are looked at.
+/// Points of the ranges at which limits are checked.
 pub(crate) struct Places<'p> {
-    /// The middle, the ends and corners: where the answer keeps them.
+    /// The middle, the ends and corners, at all of which the answer must keep the limits.
     pub all: &'p [Vec<f64>],
-    /// Those far from the middle at which each round looks.
+    /// Points far from the middle that each round checks.
     pub far: Vec<Vec<f64>>,
 }
 
 impl Designer<'_, '_> {
-    /// The best candidate below a cost that keeps all limits at all points, of so many that are looked at; where all break one, that
-    /// which does by the least. Points where better ones break a limit join those far from the middle, and their costs say so.
+    /// The best candidate with a cost below `below` that keeps all limits at all points.
+    ///
+    /// At most `looks` candidates are checked. Where all break a limit at the points of the search,
+    /// the answer is the one with the smallest violation. Points at which better candidates break a
+    /// limit join `places.far`, and `costs` then contain the violation.
     ///
     /// # Errors
     /// When the engine fails.

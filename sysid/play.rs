@@ -1,4 +1,4 @@
-//! Motions simulated in batches, at several values of the unknowns, with all limits looked at.
+//! Simulates motions in batches, at several values of the unknowns, and checks all limits.
 
 use asid_core::error::Result;
 use asid_core::layout::Recording;
@@ -12,24 +12,27 @@ use asid_readings::SignalSet;
 use crate::limits::{Excess, Limits};
 use crate::{columns, targets};
 
-/// Simulations of a batch at most.
+/// Most simulations in a batch.
 const BATCH: usize = 256;
 
-/// Normal force between bodies (N) from which they count as touching: above what a soft contact has at rounding.
+/// Normal force between bodies (N) above which they count as touching.
+///
+/// It exceeds the rounding of a soft contact.
 pub(crate) const TOUCH: f64 = 1e-6;
 
-/// A motion that was simulated at one point.
+/// A motion simulated at one point.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// Readings of the sensors at the ends of the frames, `frames x width`; empty where it diverged.
+    /// Readings of the sensors at the ends of the frames, `frames x width`; empty where it
+    /// diverged.
     pub readings: Vec<f64>,
     /// Positions, `frames x nq`.
     pub qpos: Vec<f64>,
-    /// By how much limits are passed.
+    /// Violations of limits.
     pub excess: Excess,
 }
 
-/// A column of the batch that is a property of a drive.
+/// A column of the batch that is a parameter of a drive.
 pub(crate) struct DriveColumn {
     pub(crate) column: usize,
     pub(crate) actuator: usize,
@@ -38,7 +41,7 @@ pub(crate) struct DriveColumn {
     pub(crate) nominal: f64,
 }
 
-/// What plays motions.
+/// Simulates motions of a machine.
 pub struct Player<'a> {
     /// The machine.
     pub(crate) plant: &'a Plant,
@@ -47,16 +50,16 @@ pub struct Player<'a> {
     pub(crate) drives: Vec<DriveColumn>,
     pub(crate) simulator: Box<dyn Simulator>,
     pub(crate) record: Recording,
-    /// Sensors that tell, with their noise.
+    /// Sensors that count, with their noise.
     pub signals: Vec<Signal>,
     /// Differences of readings in units of the noise.
     pub differences: SignalSet,
     pub(crate) readings: usize,
-    /// Which of the pairs that should stay apart touch at rest already, and may.
+    /// Whether each pair of `limits.apart` already touches at rest, and therefore may.
     pub(crate) touching: Vec<bool>,
     /// Commands at rest.
     pub(crate) base: Vec<f64>,
-    /// Seconds that the machine settles under them before a motion.
+    /// Time that the machine settles under the commands at rest before a motion, s.
     pub(crate) settle: f64,
 }
 
@@ -128,7 +131,7 @@ impl<'a> Player<'a> {
         self.simulator.steps_taken()
     }
 
-    /// Velocities of the machine, `nv`.
+    /// Number of velocity coordinates, `nv`.
     #[must_use]
     pub fn coordinates(&self) -> usize {
         self.plant.layout.nv
@@ -146,7 +149,9 @@ impl<'a> Player<'a> {
         self.readings
     }
 
-    /// Puts simulations to rest at values of the parameters; returns the largest speed that is left (rad/s or m/s).
+    /// Brings simulations to rest at parameter values.
+    ///
+    /// Returns the largest speed that remains (rad/s or m/s).
     pub(crate) fn begin(&mut self, points: &[&[f64]]) -> Result<f64> {
         let sims: Vec<usize> = (0..points.len()).collect();
         let values: Vec<f64> = points
@@ -183,7 +188,7 @@ impl<'a> Player<'a> {
         }))
     }
 
-    /// The largest speed (rad/s or m/s) that is left after settling, over some points.
+    /// The largest speed (rad/s or m/s) that remains after settling, over some points.
     ///
     /// # Errors
     /// As [`Player::play`].
@@ -194,7 +199,8 @@ impl<'a> Player<'a> {
             .try_fold(0.0, |worst: f64, chunk| Ok(worst.max(self.begin(chunk)?)))
     }
 
-    /// Lets bodies touch that do so at rest, as feet do the ground; their names.
+    /// Allows contacts that exist at rest, as of feet on the ground; returns the names of the
+    /// bodies.
     ///
     /// # Errors
     /// As [`Player::play`].
@@ -219,12 +225,14 @@ impl<'a> Player<'a> {
             .collect())
     }
 
-    /// Does without settling.
+    /// Turns settling off.
     pub fn skip_settling(&mut self) {
         self.settle = 0.0;
     }
 
-    /// Plays motions (commands `frames x nu` of frames of `substeps` physics steps), each at a point.
+    /// Simulates jobs of commands and parameter values.
+    ///
+    /// Commands are `frames x nu`, with frames of `substeps` physics steps.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -258,7 +266,7 @@ impl<'a> Player<'a> {
 /// The number of physics steps of a frame of about `period` seconds.
 ///
 /// # Errors
-/// When the period is no positive number of seconds.
+/// When the period is shorter than a time step, or not a finite number.
 pub fn substeps(plant: &Plant, period: f64) -> Result<usize> {
     let steps = (period / plant.layout.timestep).round();
     if steps >= 1.0 && steps.is_finite() {

@@ -1,8 +1,8 @@
-//! Motions rehearsed in simulated true machines: logs as a real machine would give them.
+//! Rehearses motions in simulated true machines: logs as a real machine would give them.
 //!
-//! The log begins in the scene's first state, which is known; the machine settles, unread, as before every motion of
-//! [`crate::play`], and then moves. So what an identification makes of it is what [`crate::tells`] expects, as far as the
-//! machine is linear in its unknowns.
+//! The log begins in the scene's first state, which is known. The machine settles, unread, as
+//! before every motion of [`crate::play`], and then moves. An identification from the log therefore
+//! matches the expectation of [`crate::tells`], as far as the machine is linear in its unknowns.
 
 use asid_core::Episode;
 use asid_core::episode::{ChannelColumns, InitialState};
@@ -15,20 +15,22 @@ use rand_distr::StandardNormal;
 use crate::limits::Excess;
 use crate::play::Player;
 
-/// What a true machine did.
+/// Result of a rehearsal.
 #[derive(Clone, Debug)]
 pub struct Rehearsed {
     /// Its log, with noise.
     pub log: Episode,
-    /// By how much it passed limits, looked at after every physics step.
+    /// Violations of limits, checked after every physics step.
     pub excess: Excess,
 }
 
-/// Plays commands (`frames x nu`, frames of `substeps` physics steps) on a machine whose unknowns have the values `truth`, in their
-/// units.
+/// Plays commands on a machine whose unknowns have the values `truth`, in their units.
+///
+/// Commands are `frames x nu`, with frames of `substeps` physics steps.
 ///
 /// # Errors
-/// When the machine diverges, its time to settle is no whole number of frames, or the engine fails.
+/// When the machine diverges, its time to settle is not a whole number of frames, or the engine
+/// fails.
 pub fn rehearse(
     player: &mut Player<'_>,
     (commands, substeps): (&[f64], usize),
@@ -91,7 +93,9 @@ pub fn rehearse(
     })
 }
 
-/// A reading with normal noise; one of four entries is an orientation, which is turned about its body's axes.
+/// Adds normal noise to a reading.
+///
+/// One of four entries is an orientation, which is turned about its body's axes.
 fn noisy(reading: &[f64], deviation: f64, rng: &mut Rng) -> Vec<f64> {
     let mut normal = || deviation * rng.sample::<f64, _>(StandardNormal);
     if let [w, x, y, z] = *reading {
@@ -123,7 +127,7 @@ mod tests {
                 by.angle().powi(2)
             })
             .collect();
-        // Three axes; the mean of 12000 squares is good to 1.3 %.
+        // Three axes; the mean of 12000 squares is accurate to 1.3 %.
         let deviation = (turns.iter().sum::<f64>() / 12000.0).sqrt();
         assert!((deviation / 0.01 - 1.0).abs() < 0.03, "{deviation}");
     }

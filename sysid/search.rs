@@ -1,9 +1,11 @@
 //! The cross-entropy search over the coefficients of a motion.
 //!
-//! It begins with one drive after the other ([`crate::by_drive`]), or at a draw of all drives where that tells more, and makes
-//! the objective small among the candidates that keep all limits; those that do not rank behind them, by how much they
-//! break ([`crate::candidates`]). A candidate that is better than all before it is played at the middle, the ends and corners of the ranges, with
-//! the limits looked at after every physics step; where it breaks one there, the search looks at that point from then on.
+//! It starts from a motion built one drive after the other ([`crate::by_drive`]), or from a random
+//! motion of all drives if that is more informative. It minimises the objective among the
+//! candidates that keep all limits; the others rank behind them, by the size of their violations
+//! ([`crate::candidates`]). A candidate that beats all before it is simulated at the middle, the
+//! ends and corners of the ranges, with limits checked after every physics step. Where it breaks a
+//! limit at a point, the search checks that point from then on.
 
 use asid_algorithms::optimise::cem::{Cem, CemSettings};
 use asid_core::Progress;
@@ -17,33 +19,38 @@ use crate::method::DesignSettings;
 use crate::motion::{Family, Shape};
 use crate::places::Places;
 
-/// Coordinates of the machine whose physics steps count once.
+/// Number of velocity coordinates up to which a physics step counts once.
 const SIX_JOINTS: f64 = 6.0;
 
-/// Power of the number of coordinates that the time of a physics step grows with: between the linear one of a chain and the
-/// cubic one of its constraints.
+/// Power of the number of coordinates by which the time of a physics step grows.
+///
+/// It lies between the linear time of a chain and the cubic time of its constraints.
 const GROWTH: f64 = 1.5;
 
-/// Share of a round's candidates that the next one is drawn about.
+/// Share of a round's candidates that the next round's distribution is fitted to.
 const ELITE: f64 = 0.2;
 
-/// Rounds of the search at least.
+/// Fewest rounds of the search.
 const FEWEST_ROUNDS: usize = 8;
 
-/// First deviation of the search in each coefficient, about its start, in units of what its drive may move.
+/// Initial standard deviation of each coefficient, in units of its drive's reach.
 const SPREAD: f64 = 0.3;
 
-/// Smallest size of the draws of all drives, in units of what each may move alone: together they push a machine further.
+/// Smallest scale of the random motions of all drives, in units of each drive's own reach.
+///
+/// Together, drives push a machine further than alone.
 const SMALLEST: f64 = 1e-2;
 
-/// Sizes in which each round tries the best motion so far.
+/// Scales at which each round tries the best motion so far.
 const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
 
-/// Candidates of a round that are looked at everywhere, at most: each that breaks a limit shows the search a new point.
+/// Most candidates of a round that are checked at all points.
+///
+/// Each that breaks a limit adds a point to the search's checks.
 const LOOKS: usize = 4;
 
 impl Designer<'_, '_> {
-    /// The search; the best coefficients, and the best cost after each round.
+    /// Runs the search; returns the best coefficients, and the best cost after each round.
     ///
     /// # Errors
     /// When the engine fails.
@@ -54,7 +61,7 @@ impl Designer<'_, '_> {
         rng: &mut Rng,
         progress: &dyn Progress,
     ) -> Result<(Vec<f64>, Vec<f64>)> {
-        // What a step counts.
+        // Weight of a physics step.
         let size = self.player.coordinates() as f64 / SIX_JOINTS;
         let bound = settings.physics_steps / size.max(1.0).powf(GROWTH);
         let begun = self.player.steps();
@@ -86,7 +93,7 @@ impl Designer<'_, '_> {
             if round >= FEWEST_ROUNDS && (self.player.steps() - begun) as f64 >= bound {
                 break;
             }
-            // The best so far, also larger and smaller: limits bind the size before the shape.
+            // Include the best motion at several scales: limits bind its size before its shape.
             let mut candidates: Vec<Vec<f64>> = SIZES
                 .iter()
                 .map(|size| best.0.iter().map(|c| (c * size).clamp(-1.0, 1.0)).collect())
@@ -110,8 +117,10 @@ impl Designer<'_, '_> {
         Ok((best.0, course))
     }
 
-    /// Draws of all drives, and curves like those of the baselines, each drive in units of what it may move, at sizes
-    /// from the whole down: the best of them where it is better than the start, else the start.
+    /// The best of some random motions of all drives where it beats the start, else the start.
+    ///
+    /// The motions are random splines and curves like those of the baselines. Each drive moves in
+    /// units of its own reach, at scales from one down.
     fn drawn(
         &mut self,
         settings: &DesignSettings,

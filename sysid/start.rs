@@ -1,4 +1,4 @@
-//! Where an episode begins: as its log says, as its first readings show, else as the scene has it.
+//! The initial state of an episode: from its log, its first readings, or else the scene.
 
 use asid_core::Episode;
 use asid_core::episode::InitialState;
@@ -9,11 +9,15 @@ use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Rows over which a first velocity is taken: enough to outweigh the noise of two readings, few enough that a
-/// motion does not turn.
+/// Rows over which an initial velocity is taken.
+///
+/// They are enough to outweigh the noise of two readings, and few enough that a motion does not
+/// reverse.
 const ROWS: usize = 6;
 
-/// The start of an episode, and its coordinates (`nv` positions, then `nv` velocities) that the log leaves open.
+/// The initial state of an episode, and the coordinates of it that the log leaves open.
+///
+/// Coordinates are `nv` positions, then `nv` velocities.
 #[must_use]
 pub fn start_of(plant: &Plant, episode: &Episode) -> (InitialState, Vec<usize>) {
     let layout = &plant.layout;
@@ -40,7 +44,7 @@ pub fn start_of(plant: &Plant, episode: &Episode) -> (InitialState, Vec<usize>) 
     (state, open)
 }
 
-/// Where the quaternion of a joint begins in `qpos`.
+/// Index in `qpos` at which the quaternion of a joint begins.
 fn quaternion(joint: &asid_core::layout::Joint) -> Option<usize> {
     match joint.kind {
         JointKind::Free => Some(joint.qpos + 3),
@@ -49,7 +53,9 @@ fn quaternion(joint: &asid_core::layout::Joint) -> Option<usize> {
     }
 }
 
-/// Coordinates that a state leaves open. A quaternion with a missing component leaves its whole turn open.
+/// Coordinates that a state leaves open.
+///
+/// A quaternion with a missing component leaves the whole orientation open.
 fn open_coordinates(layout: &Layout, given: &InitialState) -> Vec<usize> {
     let mut open = Vec::new();
     for joint in &layout.joints {
@@ -79,7 +85,7 @@ fn open_coordinates(layout: &Layout, given: &InitialState) -> Vec<usize> {
     open
 }
 
-/// Sets what sensors of joints and of free bodies show in the first rows.
+/// Sets the state from the first rows of sensors of joints and of free bodies.
 fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
     let layout = &plant.layout;
     for (i, sensor) in layout.sensors.iter().enumerate() {
@@ -117,7 +123,7 @@ fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
             _ => {}
         }
     }
-    // A speed that is measured is better than a difference.
+    // A measured speed is better than a difference.
     for (i, sensor) in layout.sensors.iter().enumerate() {
         if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
             && let Some(range) = episode.channel(&sensor.name)
@@ -130,8 +136,9 @@ fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
     }
 }
 
-/// The state moved along a coordinate: of the `nv` positions (`< nv`), then of the `nv` velocities. Orientations turn
-/// about the body's own axes.
+/// The state moved along a coordinate: of the `nv` positions (`< nv`), then of the `nv` velocities.
+///
+/// Orientations turn about the body's own axes.
 #[must_use]
 pub fn moved(layout: &Layout, state: &InitialState, coordinate: usize, by: f64) -> InitialState {
     let mut state = state.clone();

@@ -1,10 +1,11 @@
 //! What readings tell about the unknowns: Fisher information, in units of the prior.
 //!
-//! For Gaussian noise the information of an episode is `I = Σ J^T S^-1 J` over its readings, `J` their derivative in the
-//! unknowns along the whole trajectory (the perturbed machine is played from the begin under the same commands). Here `J`
-//! is whitened by the noise and taken in prior deviations of the unknowns, so that the prior's own information is the identity.
-//! Nuisance entries stand behind the unknowns: they are estimated along, and projected out by taking the unknowns' block of
-//! the inverse.
+//! For Gaussian noise of covariance `S` the information of an episode is `I = Σ J^T S^-1 J` over
+//! its readings. `J` is their derivative in the unknowns along the whole trajectory: the perturbed
+//! machine is simulated from the beginning under the same commands. Here `J` is whitened by the
+//! noise and scaled to prior standard deviations of the unknowns, so that the prior's own
+//! information is the identity. Nuisance entries follow the unknowns. They are estimated jointly,
+//! and projected out by taking the unknowns' block of the inverse.
 
 use asid_algorithms::fisher::{Objective, inverse_above_prior};
 use asid_core::episode::InitialState;
@@ -17,20 +18,26 @@ use crate::dataset::{Dataset, Replayer};
 use crate::marginal::marginal;
 use crate::play::{Played, Player};
 
-/// Half step of the differences, in prior deviations: straight for smooth machines, and far above rounding.
+/// Half step of the differences, in prior standard deviations.
+///
+/// Smooth machines are linear over it, and it is far above rounding.
 const STEP: f64 = 0.02;
 
-/// Half step of the differences that a search ranks motions by, in prior deviations. A contact that comes a time step earlier
-/// or later, and a machine that doubles any small difference many times over, change readings by about as much however
-/// short the step is: divided by a short one that looks like information, and no identification finds it. Over this step, a
-/// seventh of the way to the end of a uniform range, it counts a twelfth as much, and what is smooth is nearly as straight.
+/// Half step of the differences that rank motions in a search, in prior standard deviations.
+///
+/// Some changes of a reading are about equally large for any step: those of a contact that comes a
+/// time step earlier or later, or of a machine that amplifies small differences. Divided by a short
+/// step they look like information that no identification finds. Over this step, a seventh of the
+/// way to the end of a uniform range, they count a twelfth as much as over [`STEP`], and smooth
+/// machines are nearly as linear.
 const SEARCH_STEP: f64 = 0.25;
 
-/// Information along a direction below which the readings do not see it: less than a uniform prior's own, whose variance
-/// is a twelfth of its range squared.
+/// Information along a direction below which it counts as unseen by the readings.
+///
+/// It is less than a uniform prior's own, whose variance is a twelfth of its range squared.
 const UNSEEN: f64 = 1.0 / 12.0;
 
-/// Share of a direction that an unknown has to be named in it.
+/// Weight that an unknown needs in a direction to be named in it.
 const NAMED: f64 = 0.2;
 
 /// Information about unknowns and nuisance entries, without the prior.
@@ -43,7 +50,7 @@ pub struct Told {
 }
 
 impl Told {
-    /// Nothing about `sought` unknowns of `n` entries.
+    /// No information about `sought` unknowns of `n` entries.
     #[must_use]
     pub fn nothing(sought: usize, n: usize) -> Self {
         Self {
@@ -52,7 +59,9 @@ impl Told {
         }
     }
 
-    /// What whitened derivatives tell, one column an entry, about `sought` unknowns of `n` entries; nothing where there are none.
+    /// Information of whitened derivatives about `sought` unknowns of `n` entries.
+    ///
+    /// There is one column for each entry, and no information without columns.
     #[must_use]
     pub(crate) fn of(columns: Option<&[Vec<f64>]>, (sought, n): (usize, usize)) -> Self {
         let mut told = Self::nothing(sought, n);
@@ -62,7 +71,7 @@ impl Told {
         told
     }
 
-    /// Adds whitened derivatives, one column an entry. Readings that are missing tell nothing.
+    /// Adds whitened derivatives, one column for each entry. Missing readings add nothing.
     pub fn add(&mut self, columns: &[Vec<f64>]) {
         let n = columns.len();
         let rows = columns.first().map_or(0, Vec::len);
@@ -78,7 +87,7 @@ impl Told {
         }
     }
 
-    /// This, `times` times, and another one.
+    /// `times` times this information, plus another one.
     #[must_use]
     pub fn and(&self, times: f64, other: &Self) -> Self {
         Self {
@@ -87,26 +96,27 @@ impl Told {
         }
     }
 
-    /// Covariance of the unknowns that are sought, with the prior, in prior deviations.
+    /// Posterior covariance of the sought unknowns, in prior standard deviations.
     #[must_use]
     pub fn covariance(&self) -> DMatrix<f64> {
         let all = self.whole_covariance();
         all.view((0, 0), (self.sought, self.sought)).into_owned()
     }
 
-    /// The same of the nuisance entries too.
+    /// Posterior covariance of the unknowns and the nuisance entries.
     fn whole_covariance(&self) -> DMatrix<f64> {
         let n = self.matrix.nrows();
         inverse_above_prior(&(&self.matrix + DMatrix::identity(n, n)))
     }
 
-    /// Expected standard deviation of each unknown and nuisance entry, in prior deviations.
+    /// Expected standard deviation of each unknown and nuisance entry, in prior standard
+    /// deviations.
     pub(crate) fn all_deviations(&self) -> Vec<f64> {
         let diagonal = self.whole_covariance().diagonal();
         diagonal.iter().map(|v| v.max(0.0).sqrt()).collect()
     }
 
-    /// Expected standard deviation of each unknown, in prior deviations.
+    /// Expected standard deviation of each unknown, in prior standard deviations.
     #[must_use]
     pub fn deviations(&self) -> Vec<f64> {
         let covariance = self.covariance();
@@ -115,7 +125,9 @@ impl Told {
             .collect()
     }
 
-    /// What a search makes small: the trace of the covariance, the log of its determinant, or the negative trace of the
+    /// The cost that a search minimises.
+    ///
+    /// It is the trace of the covariance, the log of its determinant, or the negative trace of the
     /// information.
     #[must_use]
     pub fn cost(&self, objective: Objective) -> f64 {
@@ -140,7 +152,7 @@ impl Told {
         let eigen = covariance.symmetric_eigen();
         let mut found = Vec::new();
         for (k, variance) in eigen.eigenvalues.iter().enumerate() {
-            // The prior's own information is one.
+            // Subtract the prior's own information, which is one.
             if 1.0 / variance.max(f64::MIN_POSITIVE) - 1.0 >= UNSEEN {
                 continue;
             }
@@ -158,8 +170,10 @@ impl Told {
     }
 }
 
-/// The points of central differences about `values`: the middle, then up and down in each entry; and the distances
-/// between up and down, in prior deviations.
+/// The points of central differences about `values`, and the widths of the differences.
+///
+/// The points are the middle, then up and down in each entry. The widths are the distances between
+/// up and down, in prior standard deviations.
 #[must_use]
 pub fn differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
     differences_over(parameters, values, &vec![STEP; parameters.len()])
@@ -171,7 +185,7 @@ pub fn search_differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<
     differences_over(parameters, values, &vec![SEARCH_STEP; parameters.len()])
 }
 
-/// Differences of a half step in each entry, in prior deviations.
+/// Points and widths for given half steps of each entry, in prior standard deviations.
 pub(crate) fn differences_over(
     parameters: &[Parameter],
     values: &[f64],
@@ -193,14 +207,16 @@ pub(crate) fn differences_over(
     (points, widths)
 }
 
-/// What a motion tells, from its plays at the points of [`differences`].
+/// Information of a motion, from its plays at the points of [`differences`].
 #[must_use]
 pub fn of_plays(player: &Player<'_>, plays: &[Played], widths: &[f64], sought: usize) -> Told {
     let columns = derivatives(player, plays, widths);
     Told::of(columns.as_deref(), (sought, widths.len()))
 }
 
-/// Whitened derivatives from plays at the points of [`differences`], one column an entry; `None` where a play diverged.
+/// Whitened derivatives from plays at the points of [`differences`], one column for each entry.
+///
+/// `None` where a play diverged.
 pub(crate) fn derivatives(
     player: &Player<'_>,
     plays: &[Played],
@@ -223,7 +239,7 @@ pub(crate) fn derivatives(
     Some(widths.iter().enumerate().map(column).collect())
 }
 
-/// What logs tell, with the starts that they leave open marginalised.
+/// Information of logs, with the initial states that they leave open marginalised.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
@@ -276,7 +292,8 @@ mod tests {
 
     #[test]
     fn nuisance_is_projected_out() {
-        // An unknown that looks like the nuisance: only its difference from it tells, by Schur's complement.
+        // The unknown looks like the nuisance entry: Schur's complement leaves only their
+        // difference.
         let found = told(1, &[100.0, 100.0, 100.0, 100.0]);
         let expected = 1.0 / (101.0 - 100.0 * 100.0 / 101.0);
         assert!((found.covariance()[(0, 0)] - expected).abs() < 1e-9);

@@ -1,11 +1,13 @@
-//! A search among the valleys of a rough loss.
+//! A search among the local minima (valleys) of a rough loss.
 //!
-//! Where bodies make and break contact, a step of a hundredth of a prior deviation changes which contact comes first, and the loss of
-//! open-loop replays jumps. A straight line over a region of such a loss promises a place that its own replay does not
-//! confirm, and damped steps end in the first of many valleys. So the place that a fit arrives at is replayed. Where that is worse
-//! than the best replay so far by more than chance explains, draws about the best one are ranked by their own
-//! replays, by covariance matrix adaptation (N. Hansen, arXiv:1604.00772), whose mean is blind to single jumps. What is known of
-//! the values stays what the fit over the whole region says, roughness included.
+//! Where bodies make and break contact, a step of a hundredth of a prior standard deviation changes
+//! which contact comes first, and the loss of open-loop replays jumps. A linear fit over a region
+//! of such a loss predicts a minimum that its own replay does not confirm, and damped steps end in
+//! the first of many valleys. The point that a fit arrives at is therefore replayed. If its loss
+//! exceeds the best replay's by more than chance explains, the search continues by covariance
+//! matrix adaptation (N. Hansen, arXiv:1604.00772). Draws about the best point are ranked by their
+//! own replays, and the mean of the draws averages over single jumps. The uncertainty of the values
+//! remains that of the fit over the whole region, roughness included.
 
 use asid_algorithms::fisher::inverse_above_prior;
 use asid_algorithms::optimise::cma_es::{CmaEs, CmaEsSettings};
@@ -17,35 +19,46 @@ use asid_core::error::Result;
 use asid_core::rng::Rng;
 use nalgebra::DMatrix;
 
-/// Half squares by which the replay of a fitted place may be worse than the best that was seen: from there on a place lies outside
-/// of the 95 % interval of one unknown, whose chi-squared is 3.84.
+/// Excess of the half sum of squares at a fitted point over the best seen that is still accepted.
+///
+/// Beyond it a point lies outside the 95 % interval of one unknown, whose chi-squared is 3.84.
 const UNCONFIRMED: f64 = 1.92;
 
-/// First deviation of the draws at most, in prior deviations: a sixth of a uniform range. With 0.1 the search of a quadruped's knee
-/// stayed 0.4 from its value.
+/// Largest initial standard deviation of the draws, in prior standard deviations.
+///
+/// It is a sixth of a uniform range. With 0.1 the search of a quadruped's knee stayed 0.4 from its
+/// value.
 const SPREAD: f64 = 0.3;
 
-/// The same beside what the fit knows: far enough to leave a wrong valley, near enough that an unknown that is known to a
+/// Initial standard deviation of the draws, in posterior standard deviations of the fit.
+///
+/// It is wide enough to leave a wrong valley. It is narrow enough that an unknown known to a
 /// thousandth does not take the first half of the search.
 const WIDEN: f64 = 10.0;
 
-/// Draws of a generation: six times what smooth losses of five unknowns take, since many valleys are looked at. With 24 a quadruped's
-/// search stayed in the first one for some draws of chance.
+/// Draws of a generation: six times what smooth losses of five unknowns take.
+///
+/// There are many valleys to compare. With 24 a quadruped's search stayed in the first one for some
+/// random draws.
 const DRAWS: usize = 48;
 
-/// Generations at most: the quadruped's had arrived after 20 to 30.
+/// Most generations: the quadruped's search had converged after 20 to 30.
 const GENERATIONS: usize = 30;
 
-/// A generation whose half squares differ by less than this has arrived: a tenth of [`UNCONFIRMED`].
+/// A generation has converged where its half sums of squares differ by less than this.
+///
+/// It is a tenth of [`UNCONFIRMED`].
 const ALIKE: f64 = 0.2;
 
-/// First half step of the fit over the region about the best place, in prior deviations: what is known of an unknown after a good motion.
+/// First half step of the fit over the region about the best point, in prior standard deviations.
+///
+/// It is the posterior standard deviation of an unknown after a good motion.
 const REGION: f64 = 0.02;
 
-/// Residuals at points, and the best point so far.
+/// Evaluates residuals, and remembers the best point so far.
 pub(crate) struct Watched<'r, 'f> {
     of: &'r mut Residuals<'f>,
-    /// The point with the smallest half sum of squares so far, and this.
+    /// The point with the smallest half sum of squares so far, and that sum.
     lowest: Option<(Vec<f64>, f64)>,
 }
 
@@ -54,7 +67,7 @@ impl<'r, 'f> Watched<'r, 'f> {
         Self { of, lowest: None }
     }
 
-    /// Residuals; `None` where a replay diverged.
+    /// Residuals at points; `None` where a replay diverged.
     ///
     /// # Errors
     /// As the evaluation.
@@ -69,7 +82,7 @@ impl<'r, 'f> Watched<'r, 'f> {
         Ok(rows)
     }
 
-    /// Half sums of squares; infinite where a replay diverged.
+    /// Half sums of squares at points; infinite where a replay diverged.
     ///
     /// # Errors
     /// As the evaluation.
@@ -84,7 +97,7 @@ fn half_squares(row: &[f64]) -> f64 {
     0.5 * row.iter().map(|x| x * x).sum::<f64>()
 }
 
-/// The fit where its place is confirmed by a replay; else one about the best place among draws.
+/// The fit if a replay confirms its point; else a fit about the best point of a search by draws.
 ///
 /// # Errors
 /// As the evaluation.
@@ -99,10 +112,10 @@ pub(crate) fn confirmed(
     let Some((best, least)) = watched.lowest.clone() else {
         return Ok(found);
     };
-    // A model that lacks something has a larger loss everywhere, and larger differences.
+    // A model that lacks an effect has a larger loss everywhere, and larger differences of it.
     let scale = (2.0 * least / space.readings.max(1) as f64).max(1.0);
-    // What single replays differ by beside the straight line. Where that is little the line is bent and not the loss rough, and its own
-    // place is as good as the line.
+    // The scatter of single replays about the linear fit. Where it is small the loss is curved, not
+    // rough, and the fit's own point is as good as the linear model.
     let luck = 0.5 * found.roughness.powi(2) * space.readings as f64;
     if (here - least).min(luck) <= UNCONFIRMED * scale {
         return Ok(found);
@@ -123,7 +136,7 @@ pub(crate) fn confirmed(
     about(watched, found, settings, space, rng)
 }
 
-/// First deviations of the draws: wide beside what the fit knows.
+/// Initial standard deviations of the draws: wide compared with the posterior of the fit.
 fn widths(information: &DMatrix<f64>) -> Vec<f64> {
     let n = information.nrows();
     let covariance = inverse_above_prior(&(information + DMatrix::identity(n, n)));
@@ -131,8 +144,9 @@ fn widths(information: &DMatrix<f64>) -> Vec<f64> {
     known.map(|known| (WIDEN * known).min(SPREAD)).collect()
 }
 
-/// The best place so far, moved within its valley by a straight line over a small region about it. What is known of the values stays
-/// what the first fit says, whose region has the valleys in it.
+/// The best point so far, moved within its valley by a linear fit over a small region about it.
+///
+/// The uncertainty remains that of the first fit, whose region contains the valleys.
 fn about(
     watched: &mut Watched<'_, '_>,
     found: Fit,
@@ -148,7 +162,7 @@ fn about(
         pairs.map(|(end, x)| end - x).collect()
     };
     let (low, high) = (from_middle(space.low), from_middle(space.high));
-    // No descent: a start at the middle, and the fits over its region.
+    // No descent: one start at the middle, and the fits over its region.
     let settings = GaussNewtonSettings {
         screened: 1,
         starts: 1,
@@ -188,8 +202,10 @@ mod tests {
     /// Readings of one log.
     const ROWS: usize = 400;
 
-    /// Residuals of a model that is straight in two unknowns, with jumps of its later readings, the larger the later, at each twentieth of an
-    /// unknown. They vanish at `truth` alone.
+    /// Residuals of a model that is linear in two unknowns, with jumps.
+    ///
+    /// The readings jump at each twentieth of an unknown, later readings by more. The residuals
+    /// vanish at `truth` alone.
     fn jumping(z: &[f64], truth: [f64; 2]) -> Vec<f64> {
         let row = |k: usize| {
             let late = k as f64 / ROWS as f64;

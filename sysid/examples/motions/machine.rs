@@ -8,7 +8,7 @@ use crate::Outcome;
 
 /// A machine with its settings.
 pub struct Machine {
-    /// Model on its engine.
+    /// The model on its engine.
     pub subject: Subject,
     /// Unknowns, limits, noise and times.
     pub config: MotionConfig,
@@ -24,7 +24,7 @@ impl Machine {
         })
     }
 
-    /// Puts it to rest.
+    /// Prepares the design of motions, with the machine at rest.
     pub fn setup(&self, threads: usize) -> Outcome<MotionSetup<'_>> {
         Ok(MotionSetup::new(&self.subject, &self.config, threads)?)
     }

@@ -1,18 +1,20 @@
-//! Does `asid explore` find better motions than the field's baselines, for machines that others wrote?
+//! Compares the motions of `asid explore` with the field's baselines, on models that others wrote.
 //!
 //! ```sh
 //! python3 sysid/examples/motions/fetch.py MODELS
 //! cargo run --release --features mujoco --example motions -- MODELS OUT [SEEDS [NAME…]]
 //! ```
 //!
-//! Each `NAME.toml` beside this file is a `--config` of `asid explore` for the model `MODELS/NAME.xml`. For each, motions are
-//! designed as by `asid explore`, by the default method and by the baselines: those that draw draw anew for each seed. For
-//! each seed (default 20) a true machine is drawn from the ranges of the unknowns, plays the motion, is read with noise, and is
-//! identified by the code of `asid identify`; whether it breaks a limit is looked at after every physics step. Errors are in
-//! deviations of the prior, a machine's figure is the root mean square over its unknowns. Motions and worlds are files in OUT, and
-//! a call goes on from those that are there. The tables go to standard output.
+//! Each `NAME.toml` beside this file is a `--config` of `asid explore` for the model
+//! `MODELS/NAME.xml`. Motions are designed for each as by `asid explore`, by the default method and
+//! by the baselines; random methods draw a new motion for each seed. For each seed (default 20) a
+//! true machine is drawn from the ranges of the unknowns. It plays the motion, is read with noise,
+//! and is identified by the code of `asid identify`; limits are checked after every physics step.
+//! Errors are in standard deviations of the prior, and a machine's figure is the root mean square
+//! over its unknowns. Motions and worlds are files in OUT, and a later call continues from the
+//! files that exist. The tables go to standard output.
 
-// A table on standard output is what this program is for.
+// Printing a table on standard output is the purpose of this program.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod machine;
@@ -30,10 +32,12 @@ use crate::table::Row;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// Seeds where the call names none.
+/// Default number of seeds.
 const SEEDS: u64 = 20;
 
-/// Threads of every design and fit: those of a small computer, on which a design is to take two minutes at most.
+/// Threads of every design and fit.
+///
+/// Those of a small computer, on which a design should take at most two minutes.
 const THREADS: usize = 2;
 
 fn main() -> Outcome<()> {
@@ -61,7 +65,7 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// The files of settings beside this one, in the order of their names.
+/// The settings files beside this one, sorted by name.
 fn cases() -> Outcome<Vec<PathBuf>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sysid/examples/motions");
     let mut files = Vec::new();
@@ -75,7 +79,7 @@ fn cases() -> Outcome<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// One machine, by all methods.
+/// Results of all methods for one machine.
 fn compared(model: &Path, case: &Path, folder: &Path, seeds: u64) -> Outcome<Vec<Row>> {
     std::fs::create_dir_all(folder)?;
     let machine = Machine::open(model, case)?;

@@ -1,4 +1,4 @@
-//! Motions, designed once and kept as files.
+//! Motions, designed once and stored in files.
 
 use std::path::Path;
 use std::time::Instant;
@@ -11,29 +11,31 @@ use serde::{Deserialize, Serialize};
 use crate::Outcome;
 use crate::machine::Machine;
 
-/// A motion and what is expected of it.
+/// A motion and its expected result.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Motion {
     /// Commands, `frames x nu`.
     pub commands: Vec<f64>,
-    /// Expected deviation of each unknown, in deviations of the prior.
+    /// Expected standard deviation of each unknown, in standard deviations of the prior.
     pub expected: Vec<f64>,
-    /// What breaks where nothing could be kept.
+    /// The limit that it breaks where no scale keeps all limits.
     pub broken: Option<String>,
     /// The limit that a larger motion would break.
     pub next_limit: Option<String>,
     /// Best cost after each round.
     pub course: Vec<f64>,
-    /// Time of the design, s.
+    /// Wall time of the design, s.
     pub wall_s: f64,
-    /// Time of all threads, s; on a computer that does other work beside, the wall time is that much longer.
+    /// Processor time of all threads, s.
+    ///
+    /// The wall time grows on a computer that does other work.
     pub cpu_s: f64,
     /// Physics steps.
     pub steps: u64,
 }
 
 impl Motion {
-    /// Root mean square of the expected deviations.
+    /// Root mean square of the expected standard deviations.
     pub fn figure(&self) -> f64 {
         root_mean_square(&self.expected)
     }
@@ -44,7 +46,7 @@ pub fn root_mean_square(x: &[f64]) -> f64 {
     (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }
 
-/// The motion of a method and a seed, from its file where that is there.
+/// The motion of a method and a seed, read from its file if it exists.
 pub fn designed(
     machine: &Machine,
     setup: &mut MotionSetup<'_>,
@@ -72,12 +74,12 @@ pub fn designed(
     Ok(motion)
 }
 
-/// Processor time of this program so far, s; 0 where the system does not tell it as Linux does.
+/// Processor time of this program so far, s; 0 where the system has no `/proc` like Linux.
 fn cpu_seconds() -> f64 {
-    /// Ticks a second of the times in `/proc`, fixed by the kernel's interface.
+    /// Ticks per second of the times in `/proc`, fixed by the kernel's interface.
     const TICKS: f64 = 100.0;
     let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    // Behind the name, which is in brackets, user and system time are the 12th and 13th entries.
+    // After the name, which is in brackets, user and system time are the 12th and 13th entries.
     let behind = text.rsplit(')').next().unwrap_or_default();
     let entries = behind.split_whitespace().skip(11).take(2);
     entries.filter_map(|x| x.parse::<f64>().ok()).sum::<f64>() / TICKS

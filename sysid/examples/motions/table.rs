@@ -7,7 +7,7 @@ use asid_statistics::{bootstrap, interquartile_mean, mean};
 use crate::motion::Motion;
 use crate::world::World;
 
-/// One method on one machine.
+/// Results of one method on one machine.
 pub struct Row {
     /// Name of the machine.
     pub machine: String,
@@ -15,32 +15,32 @@ pub struct Row {
     pub method: String,
     /// Number of unknowns.
     pub unknowns: usize,
-    /// Motions: one, or one a seed where the method draws.
+    /// Motions: one, or one for each seed of a random method.
     pub motions: Vec<Motion>,
-    /// True machines, one a seed.
+    /// True machines, one for each seed.
     pub worlds: Vec<World>,
 }
 
 impl Row {
-    /// Expected figure, the mean over its motions.
+    /// Mean of the expected figures of its motions.
     fn expected(&self) -> f64 {
         let figures: Vec<f64> = self.motions.iter().map(Motion::figure).collect();
         mean(&figures)
     }
 
-    /// Errors, one a seed.
+    /// Figures of the errors, one for each seed.
     fn errors(&self) -> Vec<f64> {
         self.worlds.iter().map(World::figure).collect()
     }
 }
 
-/// A figure of three digits.
+/// A number with three digits.
 fn three(x: f64) -> String {
     let digits = 2 - x.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
     format!("{x:.*}", digits.clamp(0, 7) as usize)
 }
 
-/// Geometric mean of ratios, with an interval where they are several.
+/// Geometric mean of ratios, with an interval if there are several.
 fn ratio(ratios: &[f64]) -> String {
     let logs: Vec<f64> = ratios.iter().map(|r| r.ln()).collect();
     let middle = three(mean(&logs).exp());
@@ -51,8 +51,10 @@ fn ratio(ratios: &[f64]) -> String {
     format!("{middle} ({} to {})", three(low.exp()), three(high.exp()))
 }
 
-/// Table of Markdown. Errors are interquartile means over the true machines with bootstrap intervals of 95 %; ratios are geometric
-/// means over the same true machines, those of expected figures over the motions that were drawn.
+/// A Markdown table.
+///
+/// Errors are interquartile means over the true machines with bootstrap intervals of 95 %. Ratios
+/// are geometric means over the same true machines; those of expected figures are over the motions.
 pub fn markdown(rows: &[Row]) -> String {
     let mut text = String::from(
         "\n| machine | motion by | expected | actual | fisher-cem's expected over it | its actual over it | design, s | processor, s | limits broken |\n\

@@ -1,4 +1,4 @@
-//! True machines: they play a motion, are read with noise, and are identified.
+//! True machines: each plays a motion, is read with noise, and is identified.
 
 use std::path::Path;
 use std::time::Instant;
@@ -13,12 +13,12 @@ use crate::machine::Machine;
 use crate::motion::{Motion, root_mean_square};
 use crate::{Outcome, THREADS};
 
-/// What came of one true machine.
+/// Result of one true machine.
 #[derive(Serialize, Deserialize)]
 pub struct World {
     /// Values of the unknowns, in their units.
     pub truth: Vec<f64>,
-    /// Estimate less truth, in deviations of the prior.
+    /// Estimate minus truth, in standard deviations of the prior.
     pub errors: Vec<f64>,
     /// Root mean square of the residuals, in units of the noise.
     pub residual: f64,
@@ -35,7 +35,7 @@ impl World {
     }
 }
 
-/// The true machine of a seed under a motion, from its file where that is there.
+/// The result of a seed's true machine under a motion, read from its file if it exists.
 pub fn met(
     machine: &Machine,
     setup: &mut MotionSetup<'_>,
