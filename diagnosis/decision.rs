@@ -1,4 +1,5 @@
-//! From evidence to probabilities and a verdict: a function of what a search has stored, without a replay.
+//! From evidence to probabilities and a verdict: a function of what a search has stored, without
+//! any replay.
 
 mod rules;
 mod sets;
@@ -12,15 +13,18 @@ use crate::judgement::Judgement;
 pub use rules::{Rule, Rules};
 use sets::Sets;
 
-/// Whether a gap without effects is so small that what evidence from row to row is for must be borne out by replays of whole logs.
+/// Whether the gap without effects is so small that replays of whole logs must confirm what the
+/// evidence favours.
 #[must_use]
 pub fn is_small(none: Replayed) -> bool {
     excess(none.train.max(none.held_out)) <= NEGLIGIBLE
 }
 
-/// Whether a set stands in spite of a small gap: where replays of whole logs, those held out too, bear it out, and where
-/// the engine's own error is no larger than what else is there. Starts that are fitted may take up all of the gap of the logs that they are fitted to:
-/// the logs held out are the judge then, and those need only be left no worse.
+/// Whether a set stands in spite of a small gap.
+///
+/// It stands if replays of whole logs, held-out logs too, confirm it, and the engine's own error is
+/// no larger than what else is there. Fitted initial states may take up the whole gap of the
+/// training logs. Then the held-out logs decide, and the training logs need only become no worse.
 fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
     let power = |mean_square: f64| mean_square - 1.0;
     let (none, kept) = (evidence.none, 1.0 - rules.closes);
@@ -37,16 +41,19 @@ fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool
     is_there(power(none.held_out)) && closes(none.held_out, set.held_out) && bears_out
 }
 
-/// Whether replays without effects leave a gap of the logs fitted to alone: no command of those held out reaches, say, the limit of a drive.
+/// Whether replays without effects leave a gap on the training logs alone, for example because no
+/// held-out command reaches the limit of a drive.
 #[must_use]
 pub fn is_in_training_alone(none: Replayed) -> bool {
     let is_there = |mean_square: f64| mean_square > LEAST_GAP * LEAST_GAP;
     is_there(none.train) && !is_there(none.held_out)
 }
 
-/// Whether replays of the logs held out come nearer to the readings with a set than without it, and than the readings' own mean
-/// ([`crate::skill`]): by what does not, nothing is explained. Where they have no gap there, a set leaves none and closes that of the logs
-/// fitted to.
+/// Whether replays of the held-out logs with a set are closer to the readings than those without
+/// it, and than the readings' own mean ([`crate::skill`]).
+///
+/// A set without such skill explains nothing. If the held-out logs have no gap, the set must leave
+/// none there and close that of the training logs.
 fn has_skill(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
     if is_in_training_alone(evidence.none) {
         let left = |mean_square: f64| mean_square - 1.0;
@@ -57,13 +64,16 @@ fn has_skill(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
     !worse_than(evidence.none.held_out) && !worse_than(evidence.mean.held_out)
 }
 
-/// Mean square of the engine's own error; 0 where it is not known, for the larger of 0 and NaN is 0.
+/// Returns the mean square of the engine's own error; 0 if it is unknown, since the larger of 0 and
+/// NaN is 0.
 fn own_error(evidence: &Evidence) -> f64 {
     evidence.own_error.max(0.0)
 }
 
-/// The same of the logs held out. It is measured along the logs that are fitted, and others may be longer or wilder: it is no smaller a share
-/// of their gap than of that of those.
+/// Returns the mean square of the engine's own error on the held-out logs.
+///
+/// It is measured on the training logs, and held-out logs may be longer or wilder. Its share of the
+/// gap is therefore taken to be at least as large as on the training logs.
 fn own_error_held_out(evidence: &Evidence) -> f64 {
     let (own, none) = (own_error(evidence), evidence.none);
     if none.train <= LEAST_GAP * LEAST_GAP {
@@ -73,14 +83,18 @@ fn own_error_held_out(evidence: &Evidence) -> f64 {
     own.max(share * (none.held_out - 1.0))
 }
 
-/// Probability that what replays of the logs held out leave, a mean square, is a gap, and not the noise or the engine's own error.
+/// Returns the probability that a mean square `held_out` left on the held-out logs is a gap, and
+/// neither noise nor the engine's own error.
 fn seen(held_out: f64, evidence: &Evidence, rules: &Rules) -> f64 {
     let gap = (held_out - own_error_held_out(evidence)).max(1.0).sqrt();
     sigmoid((gap - rules.gap) / rules.gap_scale)
 }
 
-/// What was screened and never fitted, with its weight relative to the best set: by whether a fit would pass that one; with
-/// more names by the evidence that they add, at their price.
+/// Returns the sets that were screened and never fitted, with their weights relative to the best
+/// set.
+///
+/// The weight is the probability that a fit would exceed the best set. For a set that contains the
+/// best one, it follows from the evidence that the further names add, less their price.
 fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untried> {
     let Some(best) = best.filter(|b| b.evidence > 0.0) else {
         return Vec::new();
@@ -90,7 +104,8 @@ fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untr
         if best.effects.iter().all(|e| s.effects.contains(e)) {
             let more = s.names.saturating_sub(best.names) as f64;
             let odds = (s.evidence - best.evidence) / rules.temperature - price * more;
-            // What parsimony passes over, as below.
+            // A set that parsimony passes over is not more probable than the best, as in
+            // `Sets::weigh`.
             return odds.min(-price).exp();
         }
         rules.confidence.passes(s.evidence / best.evidence)
@@ -102,12 +117,15 @@ fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untr
     untried.collect()
 }
 
-/// Share of a gap from which on it is the larger part.
+/// Share of a gap from which on it is the larger part of it.
 const LARGER_PART: f64 = 0.5;
 
-/// Share that a set leaves of the gap, 0 to 1: of the missing force or of the gap of open-loop replays, whichever is less, for what is
-/// named may make up for most of the one and leave much of the other. Where replays can be repeated it foretells the logs held out as well: what
-/// a named set leaves of their gap counts where that is the larger part, and what an ordinary machine's tolerances leave in any case.
+/// Returns the share of the gap that a set leaves, 0 to 1.
+///
+/// It is the share of the missing force or of the open-loop gap, whichever is less: what is named
+/// may make up for most of one and leave much of the other. Where replays are repeatable, the set
+/// must predict the held-out logs as well. What a named set leaves of their gap counts if it is the
+/// larger part; what tolerances leave counts in any case.
 fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     let share = |i: usize, of: fn(Replayed) -> f64| {
         let beyond = |r: Replayed| excess(of(r)).powi(2);
@@ -126,12 +144,12 @@ fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     left.max(foretold.clamp(0.0, 1.0))
 }
 
-/// Decides.
+/// Turns evidence into a judgement.
 #[must_use]
 pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let mut sets = Sets::of(evidence, rules);
     let (least, best) = sets.least_and_best();
-    // What is named is judged by the logs that show it.
+    // What is named is judged on the logs that show it.
     let judge = |r: Replayed| {
         if best != least && is_in_training_alone(evidence.none) {
             r.train
@@ -179,7 +197,7 @@ mod tests {
         }
     }
 
-    /// A search among 50 candidates that ended with the first of the sets.
+    /// A search among 50 candidates whose result is the first of the sets.
     fn evidence(none: f64, tried: Vec<Tried>, left: f64) -> Evidence {
         Evidence {
             schema: 1,
@@ -223,7 +241,7 @@ mod tests {
         assert!(found.is_unknown && found.best_explanation().labels.is_empty());
         let found = decided(&evidence(1.02, Vec::new(), 1.0));
         assert!(!found.is_unknown && found.best_explanation().labels.is_empty());
-        // What is named makes up for a tenth.
+        // The named set makes up for a tenth.
         let found = decided(&evidence(30.0, vec![tried(&["a"], 1, 40.0, 27.0)], 0.9));
         assert!(found.is_unknown);
     }

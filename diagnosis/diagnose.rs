@@ -15,19 +15,25 @@ pub use crate::settings::Settings;
 pub use crate::telling::Diagnosis;
 pub use crate::work::Work;
 
-/// Share of the gap that the other way to take the wiring must leave at most to stand: each way estimates the noise for itself, and a tenth of
-/// it is chance.
+/// Largest share of the gap that the alternative wiring may leave to be accepted.
+///
+/// Each alternative estimates the noise for itself, and a tenth of the gap is chance.
 const BETTER: f64 = 0.8;
-/// Gap in units of the noise from which on that way is tried: the right wiring and the right effect leave the noise, and below this nothing that
-/// leaves the noise is better by as much.
+/// Gap in units of the noise from which on the alternative wiring is tried.
+///
+/// The right wiring and the right effect leave the noise. Below this gap, nothing that leaves the
+/// noise is better by as much.
 const DOUBTFUL: f64 = 1.0 / BETTER;
 
-/// Rows that a log to fit to has at least, in the mean: a first speed is taken over six, and the noise over third differences, of four.
+/// Fewest rows of a training log, on average: a first speed needs six rows, and the noise needs
+/// third differences, of four rows.
 const FEWEST_ROWS: usize = 8;
 
-/// Diagnoses a study on a machine, with outliers left out of its logs and its wiring mended. Where an effect can look like what
-/// was mended, and a gap is left all the same, the wiring is taken the other way too, and what leaves less stands. The way
-/// that is more probable beforehand comes first.
+/// Diagnoses a study on a machine, with outliers left out of its logs and its wiring repaired.
+///
+/// Where an effect can look like the repaired wiring error and a gap remains, the alternative
+/// wiring is diagnosed too. The one that leaves less stands. The alternative that is more probable
+/// a priori comes first.
 ///
 /// # Errors
 /// When the logs have too few rows to tell anything, a parameter cannot be set or a rollout fails.
@@ -58,7 +64,7 @@ pub fn diagnose(
         }
     }
     intake.settle();
-    // A clock and a zero are estimated over short windows; whole logs tell them better.
+    // A clock and a zero are first estimated over short windows; whole logs determine them better.
     if let Some(short) = intake.estimated_short(&diagnosis.effects)
         && !progress.is_stopped()
     {
@@ -84,8 +90,11 @@ pub fn diagnose(
     Ok((diagnosis, work))
 }
 
-/// Refuses logs with no more readings than their starts have unknown coordinates, where a start fits the readings whatever the machine is and that
-/// no gap is left means nothing, and logs of hardly a row.
+/// Refuses logs with too few rows, and logs with no more readings than their initial states have
+/// unknown coordinates.
+///
+/// In the latter an initial state fits the readings whatever the machine is, and the absence of a
+/// gap means nothing.
 fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
     let logs = study.train.len();
     let rows: usize = study.train.iter().map(|(_, e)| e.rows()).sum();

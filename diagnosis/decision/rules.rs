@@ -1,27 +1,35 @@
-//! The numbers that decide.
+//! The parameters of the decision.
 
 use crate::confidence::Confidence;
 
-/// What decides.
+/// Parameters of the decision.
 #[derive(Clone, Debug)]
 pub struct Rules {
-    /// Evidence is divided by this before it becomes a probability: the noise model is not the machine's own.
+    /// Divisor of the evidence before it becomes a probability: the noise model is not exactly that
+    /// of the machine.
     pub temperature: f64,
-    /// Difference of evidence up to which two sets cannot be told apart: odds of 20 after the temperature.
+    /// Difference of evidence up to which two sets are not distinguished: odds of 20 after the
+    /// temperature.
     pub apart: f64,
-    /// Midpoint of the logistic in the logarithm of the share of the missing force's power, or of the gap's, that no
-    /// named effect makes up for.
+    /// Share of the missing force's power, or of the gap's, left without a name at which `unknown`
+    /// has even odds.
+    ///
+    /// It is the midpoint of a logistic in the logarithm of that share.
     pub unexplained: f64,
     /// Scale of that logistic.
     pub sharpness: f64,
-    /// Open-loop gap, in deviations of the noise and without the engine's own error, at which a missing force without a name counts as
-    /// a gap. Training worlds without a cause have at most 1.08 (22 clean ones, seed 3141); those whose cause was not named 1.2 to 4.
+    /// Open-loop gap, in standard deviations of the noise and without the engine's own error, at
+    /// which a missing force without a name counts as a gap.
+    ///
+    /// Training worlds without a cause have at most 1.08 (22 clean ones, seed 3141), those whose
+    /// cause was not named 1.2 to 4.
     pub gap: f64,
-    /// Scale of the logistic about it.
+    /// Scale of the logistic about that gap.
     pub gap_scale: f64,
-    /// Share of a small gap's power, of the logs fitted to and of those held out, that an effect must close in replays.
+    /// Share of a small gap's power that an effect must close in replays, of the training logs and
+    /// of the held-out logs.
     pub closes: f64,
-    /// How far a verdict is to be trusted.
+    /// How far a verdict can be trusted.
     pub confidence: Confidence,
 }
 
@@ -40,11 +48,11 @@ impl Default for Rules {
     }
 }
 
-/// A number that decides, by name.
+/// A parameter by its name.
 pub type Rule = (&'static str, fn(&mut Rules) -> &mut f64);
 
 impl Rules {
-    /// All numbers, so that each can be changed and the decision repeated.
+    /// All parameters, so that each can be changed and the decision repeated.
     pub const ALL: [Rule; 16] = [
         ("temperature", |r| &mut r.temperature),
         ("apart", |r| &mut r.apart),

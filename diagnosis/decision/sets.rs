@@ -1,4 +1,4 @@
-//! The sets of effects that a search fitted, and none, weighed against each other.
+//! The sets of effects that a search fitted, and the empty set, weighted against each other.
 
 use asid_results::evidence::Evidence;
 
@@ -7,23 +7,24 @@ use crate::judgement::Hypothesis;
 
 use super::{Rules, closes_a_small_gap, has_skill, is_small, seen};
 
-/// Least and most probability of `unknown` where a set is named.
+/// Least and largest probability of `unknown` where a set is named.
 const NAMED: [f64; 2] = [0.001, 0.999];
-/// The same where none is: a cause of no catalogue may hide in a gap that is closed.
+/// The same where none is named: a cause outside the catalogue may hide behind a closed gap.
 const NOT_NAMED: [f64; 2] = [0.02, 0.999];
 
-/// Sets of effects with what they score. The first is none.
+/// Sets of effects with their scores; the first is the empty set.
 pub(super) struct Sets<'e> {
     evidence: &'e Evidence,
     rules: &'e Rules,
     pub(super) all: Vec<Hypothesis>,
-    /// Of each: evidence at the [temperature](Rules::temperature), less the price of its names.
+    /// Score of each set: its evidence at the [temperature](Rules::temperature), less the price of
+    /// its names.
     scores: Vec<f64>,
-    /// Place in `all` of each set that was tried.
+    /// Index in `all` of each set that was tried.
     places: Vec<usize>,
-    /// What was tried and is no effect, but what an ordinary machine has of everything.
+    /// Index of the tried set that names no effect, but has tolerances only.
     pub(super) ordinary: Option<usize>,
-    /// Price of a name: the logarithm of how many there are to choose from.
+    /// Price of a name: the logarithm of the number of candidates.
     price: f64,
 }
 
@@ -63,7 +64,8 @@ impl<'e> Sets<'e> {
         }
     }
 
-    /// What stands without a search, no effect or the known ones; and what the search found, where that stands.
+    /// Returns the set that stands without a search (no effect, or the known ones), and the one
+    /// that the search found, if that stands.
     pub(super) fn least_and_best(&self) -> (usize, usize) {
         let (evidence, rules) = (self.evidence, self.rules);
         let least = evidence.known.map_or(0, |i| self.places[i]);
@@ -75,11 +77,12 @@ impl<'e> Sets<'e> {
         (least, stands.map_or(least, |i| self.places[i]))
     }
 
-    /// Gives each set its likelihood relative to the best; `seen` is the probability that there is a gap.
+    /// Gives each set its likelihood relative to the best; `seen` is the probability that there is
+    /// a gap.
     pub(super) fn weigh(&mut self, (least, best): (usize, usize), seen: f64) {
         let names = self.all[best].labels.len();
         for (set, score) in self.all.iter_mut().zip(&self.scores) {
-            // What parsimony passes over is not more probable than what it picks.
+            // A set that parsimony passes over is not more probable than the one that it picks.
             let most = if set.labels.len() > names {
                 -self.price
             } else {
@@ -88,13 +91,16 @@ impl<'e> Sets<'e> {
             set.probability = (score - self.scores[best]).min(most).exp();
         }
         if best != least && self.ordinary.is_none() {
-            // Chance may reach the evidence of no effect, and no chance makes a gap.
+            // By chance the empty set may reach the evidence of the best, but no chance makes a
+            // gap.
             self.all[least].probability *= 1.0 - seen;
         }
     }
 
-    /// Probability that nothing in the catalogue explains the gap, which is there with the probability `seen`; `rest` is the share of it
-    /// that the best leaves.
+    /// Returns the probability that nothing in the catalogue explains the gap.
+    ///
+    /// `seen` is the probability that there is a gap, `rest` the share of it that the best set
+    /// leaves.
     pub(super) fn unknown(&self, (least, best): (usize, usize), seen: f64, rest: f64) -> f64 {
         let (evidence, rules) = (self.evidence, self.rules);
         let unexplained = sigmoid((rest / rules.unexplained).ln() / rules.sharpness);
@@ -103,7 +109,7 @@ impl<'e> Sets<'e> {
         match self.ordinary {
             _ if best != least => unexplained,
             Some(i) => {
-                // What there was no time to try may explain what tolerances leave.
+                // Effects that there was no time to try may explain what tolerances leave.
                 let left = evidence.tried[i].replayed.held_out;
                 let is_left = if evidence.stopped {
                     self::seen(left, evidence, rules)
@@ -112,7 +118,8 @@ impl<'e> Sets<'e> {
                 };
                 (seen * unexplained).max(is_left).clamp(lowest, highest)
             }
-            // A gap that no force makes up for is one of the readings, where replays can be repeated.
+            // Where replays are repeatable, a gap for which no force makes up is one of the
+            // readings.
             None if evidence.is_missing || evidence.repeatable && !is_small(evidence.none) => {
                 seen.clamp(lowest, highest)
             }
@@ -120,7 +127,8 @@ impl<'e> Sets<'e> {
         }
     }
 
-    /// Sets that these data cannot tell from the best, whatever is likelier without them: no larger ones.
+    /// Returns the sets, none larger than the best, that these data do not distinguish from it;
+    /// prior odds are left out.
     pub(super) fn ambiguous(&self, best: usize) -> Vec<usize> {
         let rules = self.rules;
         let named = &self.all[best].labels;

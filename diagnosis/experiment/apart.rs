@@ -1,9 +1,10 @@
-//! How far two explanations predict apart once each is fitted anew.
+//! How far the predictions of two explanations differ once each is fitted again.
 //!
-//! A difference that other values of a rival would take away tells nothing. With `d` the difference of the predictions in units of the
-//! noise, and `K` what one deviation of each explanation's values changes in its own prediction, the readings of the experiment have
-//! the covariance `I + K K^T` about either prediction, and `d^T (I + K K^T)^-1 d` is what is left of `d^T d` when both are fitted to the
-//! logs and the experiment together.
+//! A difference that other values of a rival would remove carries no information. Let `d` be the
+//! difference of the predictions in units of the noise. Let `K` be the change of each explanation's
+//! own prediction per standard deviation of its values. The readings of the experiment then have
+//! the covariance `I + K K^T` about either prediction. `d^T (I + K K^T)^-1 d` is what remains of
+//! `d^T d` when both are fitted to the logs and the experiment together.
 
 use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
@@ -14,8 +15,10 @@ use crate::record::Record;
 
 use super::Rival;
 
-/// How far two explanations predict an episode apart after a fit to it, a sum of squares in units of the noise; not a number where a
-/// prediction diverges. `record` holds that episode alone.
+/// Returns how far the predictions of an episode by two explanations differ after a fit to it, a
+/// sum of squares in units of the noise.
+///
+/// It is not a finite number where a prediction diverges. `record` holds that episode alone.
 pub(super) fn apart(bench: &Bench, record: &Record, rivals: [Rival<'_>; 2]) -> Result<f64> {
     let mut predictions = Vec::with_capacity(2);
     let mut columns: Vec<DVector<f64>> = Vec::new();
@@ -29,7 +32,8 @@ pub(super) fn apart(bench: &Bench, record: &Record, rivals: [Rival<'_>; 2]) -> R
     Ok(beyond(&difference, &columns))
 }
 
-/// The prediction of an explanation, and what a deviation of its values along each principal axis of their covariance changes in it.
+/// Returns the prediction of an explanation, and its change per standard deviation of the values
+/// along each column of the Cholesky factor of their covariance.
 fn predicted(
     bench: &Bench,
     record: &Record,
@@ -45,7 +49,7 @@ fn predicted(
     points.extend(steps.iter().map(|(theta, _)| point(theta.clone())));
     let mut predictor = bench.predictor(trials, record)?;
     let all = predictor.residuals(&points)?;
-    // A residual is what was read less the prediction, and what was read is the same for all.
+    // A residual is the reading less the prediction, and the reading is the same for all.
     let mut all = all.into_iter().map(|r| -DVector::from_vec(r));
     let here = all.next().unwrap_or_else(|| DVector::zeros(0));
     let columns = all
@@ -54,8 +58,11 @@ fn predicted(
     Ok((here.clone(), columns.collect()))
 }
 
-/// Values that are a deviation, or a share of one that stays within their ranges, along each principal axis beside those of a fit; with
-/// that share, negative against the axis.
+/// Returns the values of a fit, moved by a standard deviation along each column of the Cholesky
+/// factor of their covariance, with the share moved.
+///
+/// The share is smaller where a whole standard deviation would leave the ranges, and negative in
+/// the opposite direction.
 fn deviations(of: &Explanation) -> Vec<(Vec<f64>, f64)> {
     let fit = &of.fit;
     let readings = fit.residuals.len().max(1) as f64;
@@ -110,13 +117,15 @@ mod tests {
     fn what_a_value_can_take_away_tells_nothing() {
         let d = DVector::from_vec(vec![3.0, 4.0]);
         assert_eq!(beyond(&d, &[]), 25.0);
-        // One value moves the first reading by s deviations of the noise: 9 / (1 + s^2) are left of it.
+        // One value moves the first reading by s standard deviations of the noise: 9 / (1 + s^2) of
+        // it remain.
         for s in [0.1, 1.0, 100.0] {
             let column = DVector::from_vec(vec![s, 0.0]);
             let expected = 9.0 / (1.0 + s * s) + 16.0;
             assert!((beyond(&d, &[column]) - expected).abs() < 1e-9, "{s}");
         }
-        // Two explanations that may each move it are as one with the sum of their variances.
+        // Two explanations that may each move it are equivalent to one with the sum of their
+        // variances.
         let column = DVector::from_vec(vec![1.0, 0.0]);
         let both = beyond(&d, &[column.clone(), column]);
         assert!((both - (9.0 / 3.0 + 16.0)).abs() < 1e-9);

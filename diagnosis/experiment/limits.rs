@@ -1,8 +1,8 @@
-//! Whether a machine may play a motion: within the ranges of its joints, not much faster than it was logged, and without touching what it
-//! did not touch.
+//! Whether a machine may play a motion: within its joints' ranges, not much faster than logged, and
+//! without new contacts.
 //!
-//! A model says little of what a real machine bears; its logs show what it has borne. Forces need no look: commands stay within their ranges,
-//! and drives within theirs.
+//! A model says little of what a real machine bears; its logs show what it has borne. Forces need
+//! no check: commands stay within their ranges, and drives within theirs.
 
 use asid_core::Result;
 use asid_core::layout::JointKind;
@@ -13,18 +13,20 @@ use crate::trajectory::Trajectory;
 
 use super::Rival;
 
-/// Most that a joint may move faster than in the logs: what a motion at twice the speed asks for, and a tenth for how it follows.
+/// Largest ratio of a joint's speed to that in the logs: two for a motion at twice the speed, and a
+/// tenth for how the joint follows.
 const FASTER: f64 = 2.2;
-/// Share of a joint's range that is kept free at either end, unless the logs went there: where a real machine's end stop may be.
+/// Share of a joint's range kept free at either end, unless the logs went there: a real machine's
+/// end stop may be there.
 const END_MARGIN: f64 = 0.02;
 
-/// What a machine does in the logs, by an explanation.
+/// Limits given by what a machine does in the logs, as replayed with an explanation.
 pub(super) struct Limits<'b> {
     bench: &'b Bench,
     shown: Trajectory,
 }
 
-/// The smallest and the largest of some values.
+/// Returns the smallest and the largest of some values.
 fn extremes<'v>(values: impl Iterator<Item = &'v f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
         [low.min(*x), high.max(*x)]
@@ -32,7 +34,7 @@ fn extremes<'v>(values: impl Iterator<Item = &'v f64>) -> [f64; 2] {
 }
 
 impl<'b> Limits<'b> {
-    /// By replays of the training logs with an explanation.
+    /// Takes the limits from replays of the training logs with an explanation.
     pub(super) fn of(bench: &'b Bench, rival: Rival<'_>) -> Result<Self> {
         Ok(Self {
             bench,
@@ -40,7 +42,7 @@ impl<'b> Limits<'b> {
         })
     }
 
-    /// Whether an explanation keeps them in some episodes.
+    /// Whether the machine keeps the limits in some episodes, as replayed with an explanation.
     pub(super) fn keeps(&self, record: &Record, rival: Rival<'_>) -> Result<bool> {
         let new = played(self.bench, record, rival)?;
         let layout = self.bench.layout();
@@ -56,7 +58,7 @@ impl<'b> Limits<'b> {
                         extremes(rows.flat_map(|e| e.qvel.iter().skip(dof).step_by(layout.nv)));
                     high.max(-low)
                 };
-                // What is not a number, after a divergence, keeps nothing.
+                // NaN, after a divergence, keeps no limit.
                 let keeps = fastest(&new) <= FASTER * fastest(&self.shown);
                 if !keeps {
                     return Ok(false);
@@ -83,7 +85,7 @@ impl<'b> Limits<'b> {
     }
 }
 
-/// What the machine does in some episodes, by an explanation.
+/// Returns the trajectory of the machine in some episodes, as replayed with an explanation.
 fn played(bench: &Bench, record: &Record, (trials, of): Rival<'_>) -> Result<Trajectory> {
     let mut point = of.fit.point.clone();
     point.starts.clone_from(&record.starts);

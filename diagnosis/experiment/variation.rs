@@ -2,7 +2,7 @@
 
 use asid_core::{Episode, Layout};
 
-/// A factor on the commands' size about their mean, and one on time.
+/// A factor on the size of the commands about their mean, and one on time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Variation {
     size: f64,
@@ -13,7 +13,7 @@ const fn variation(size: f64, stretch: f64) -> Variation {
     Variation { size, stretch }
 }
 
-/// As recorded first.
+/// Variations that are tried; the first leaves the commands as recorded.
 pub(super) const VARIATIONS: [Variation; 6] = [
     variation(1.0, 1.0),
     variation(0.4, 1.0),
@@ -24,7 +24,7 @@ pub(super) const VARIATIONS: [Variation; 6] = [
 ];
 
 impl Variation {
-    /// An episode whose commands are varied, within their ranges, and whose readings are zero.
+    /// Returns an episode with varied commands, within their ranges, and with readings of zero.
     pub(super) fn of(self, episode: &Episode, layout: &Layout) -> Episode {
         let nu = episode.actuators.len();
         let mut other = episode.clone();
@@ -46,7 +46,7 @@ impl Variation {
         other
     }
 
-    /// What it does, in words that follow on a log's name; empty for nothing.
+    /// Describes the variation in words that follow a log's name; empty for none.
     pub(super) fn words(self) -> String {
         let size = match self.size {
             s if s < 0.0 => " with the commands mirrored about their mean".to_owned(),
