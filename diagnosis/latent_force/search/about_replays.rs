@@ -1,8 +1,9 @@
-//! A look at what acts on readings alone, about open-loop replays of the model.
+//! Screening of effects on readings alone, about open-loop replays of the model.
 //!
-//! A sensor that is far off takes the smoothed states along: a force is then missing wherever the machine was not, drives are saturated
-//! there and contacts open, and no slope tells of the sensor. About a replay the machine is where the model has it, and what readings alone lack is seen as
-//! it is.
+//! A sensor that is far off shifts the smoothed states with it. Force is then missing wherever the
+//! machine was not. Drives saturate there, contacts open, and no derivative points to the sensor.
+//! About a replay the state is where the model puts it, and the error of the readings shows as it
+//! is.
 
 use asid_core::Result;
 use asid_effects::Reach;
@@ -17,14 +18,16 @@ use super::screening::Look;
 use super::second_look::joined;
 use super::set::{Set, name_of};
 
-/// Sets that are fitted, at most.
+/// Most sets that are fitted.
 const TRIED: usize = 3;
-/// Sets that are replayed, at most: each takes five replays of all logs or more.
+/// Most sets that are replayed: each takes five or more replays of all logs.
 const REPLAYED: usize = 8;
 
 impl Upon<'_> {
-    /// Sets that were `fitted` to the end, best first, and those of readings alone that lead about replays of what
-    /// stands. Upon no effect, where the best leaves a gap of replays.
+    /// Adds to the sets that were `fitted` to the end the sets of effects on readings that lead
+    /// about replays of the base; best first.
+    ///
+    /// This is done only upon the model without effects, if the best set leaves a gap of replays.
     pub(super) fn with_a_look_about_replays(&self, fitted: Vec<Set>) -> Result<Vec<Set>> {
         if !self.asks_replays(&fitted)? {
             return Ok(fitted);
@@ -47,13 +50,17 @@ impl Upon<'_> {
         self.with_rivals(fitted, rivals)
     }
 
-    /// Whether replays are asked beside the sets that were `fitted`, best first: upon no effect, along rows, where the best leaves a gap of replays.
+    /// Whether further sets are tried by replays: along rows, upon the model without effects, if
+    /// the best of the sets that were `fitted` leaves a gap of replays.
+    ///
+    /// The sets come in descending order of evidence.
     pub(super) fn asks_replays(&self, fitted: &[Set]) -> Result<bool> {
         let is_due = self.base.candidates.is_empty() && !self.context.has_segments();
         Ok(is_due && !self.progress.is_stopped() && !self.is_closed_by(fitted.first())?)
     }
 
-    /// Sets that were `fitted` to the end and rivals that replays have found, these fitted too; best first.
+    /// Fits rivals that replays have found, and adds them to the sets that were `fitted` to the
+    /// end; best first.
     pub(super) fn with_rivals(&self, fitted: Vec<Set>, mut rivals: Vec<Set>) -> Result<Vec<Set>> {
         for set in &mut rivals {
             let name = name_of(self.candidates, &set.candidates);
@@ -71,9 +78,12 @@ impl Upon<'_> {
         Ok(self.in_order(joined(fitted, further)))
     }
 
-    /// Sets of a look about replays that are worth a fit: those with which replays leave less than half of what stands leaves, the least first, and
-    /// those that promise what a name must. A value goes on along its slope for as long as replays leave far less: where a joint hits its stop,
-    /// a slope holds for a part of the way.
+    /// Sets of a screening about replays that are worth a fit.
+    ///
+    /// First come sets whose replays leave less than half of what replays of the base leave, in
+    /// ascending order. Then come sets that promise the evidence that a name must earn. Values
+    /// continue along their derivatives as long as replays leave far less. If a joint hits its
+    /// stop, a derivative holds for a part of the way only.
     fn leading(&self, look: &Look) -> Result<Vec<Set>> {
         let excess = |set: &Set| (self.open_loop.excess)(set);
         let stands = excess(self.base)?;
@@ -99,7 +109,7 @@ impl Upon<'_> {
         Ok(closing.chain(promising).take(TRIED).collect())
     }
 
-    /// Whether replays with a set that rises above what stands leave no gap.
+    /// Whether a set exceeds the base by the threshold and its replays leave no gap.
     pub(super) fn is_closed_by(&self, set: Option<&Set>) -> Result<bool> {
         let Some(set) = set else {
             return Ok(false);

@@ -11,15 +11,20 @@ use super::round::Upon;
 use super::screening::Look;
 use super::set::Set;
 
-/// Parts of the way that a tangent at the null goes, besides the whole of it, at which replays of whole logs are asked: each twice the next, since a
-/// fit goes on from half or twice its values.
+/// Fractions of the predicted distance from the null at which whole logs are replayed, besides the
+/// full distance.
+///
+/// They are factors of two, because a fit converges from half or twice its values.
 const PARTS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
 
 impl Upon<'_> {
-    /// The base with the candidates of a set of a screening, at the values where a fit of it begins. Where bodies touch, starts of segments
-    /// move with the values: what a link that is longer by a centimetre touches is then as far away as it was. A law that has no slope
-    /// at its null begins at that of its start values whose replays of whole logs leave least: from a null at which a contact sticks no
-    /// slope tells how far it is to where it slides, and segments that begin as the null has put them do not either.
+    /// The base with the candidates of a screened set, at the values where its fit begins.
+    ///
+    /// In segments, initial states move with the values, so that a link that becomes a centimetre
+    /// longer keeps its distance from what it touches. A law without a derivative at its null
+    /// begins at the start value whose replays of whole logs leave least. If a contact sticks at
+    /// the null, no derivative shows at which value it slides. Segments whose initial states come
+    /// from the null do not show it either.
     pub(super) fn begun(&self, look: &Look, screened: &Screened) -> Result<Set> {
         let mut best = self.enlarged(look, screened);
         let forms = &look.columns.forms;
@@ -58,10 +63,13 @@ impl Upon<'_> {
         self.with_starts(best)
     }
 
-    /// An enlarged set with the added values at another distance from their nulls, where replays of whole logs leave by far less there than where
-    /// it stands and than at the null: a slope at the null tells the direction, and over how far it holds only they do. A contact that gives
-    /// back three times as much is no three times what a third of that does. Where the null leaves no more than another program's
-    /// version of the same machine would, the set stays.
+    /// An enlarged set with its added values at another distance from their nulls, if replays of
+    /// whole logs then leave far less.
+    ///
+    /// They must leave less than half of what they leave at the present values and at the null. A
+    /// derivative at the null gives the direction, and only replays show how far it holds: a
+    /// threefold rebound of a contact does not do three times as much. The set stays as it is if
+    /// the base leaves no more than another program's version of the same machine would.
     pub(super) fn further(&self, set: &Set) -> Result<Option<Set>> {
         let excess = |set: &Set| (self.open_loop.excess)(set);
         let stands = excess(self.base)?;
@@ -83,7 +91,8 @@ impl Upon<'_> {
         Ok(best)
     }
 
-    /// An enlarged set with the added values at a `part` of their distance from their nulls, within their bounds.
+    /// An enlarged set with the added values at a fraction (`part`) of their distance from their
+    /// nulls, within their bounds.
     pub(super) fn at(&self, set: &Set, part: f64) -> Set {
         let own = self.base.fitted.theta.len()..;
         let mut other = set.clone();
@@ -96,7 +105,8 @@ impl Upon<'_> {
         other
     }
 
-    /// A set whose segments first find starts that go with its values, which would else go with the starts.
+    /// A set whose segments first find initial states that fit its values; otherwise the values
+    /// would adapt to the initial states.
     pub(super) fn with_starts(&self, mut set: Set) -> Result<Set> {
         let free = set.fitted.hypothesis.free();
         let hold = |set: &mut Set, free_too: bool| {
@@ -110,7 +120,7 @@ impl Upon<'_> {
     }
 }
 
-/// Coefficients of a screened set, one a column of its screening.
+/// Coefficients of a screened set, one for each column of its screening.
 fn changes(look: &Look, screened: &Screened) -> Vec<f64> {
     let columns = &look.columns;
     let mut changes = vec![0.0; columns.center.len()];

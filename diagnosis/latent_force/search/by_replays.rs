@@ -23,8 +23,8 @@ const REPLAYED: usize = 8;
 /// Fractions of the value that a derivative predicts at which laws are replayed: a derivative over-
 /// or underestimates large values.
 const PARTS: [f64; 5] = [0.25, 0.5, 0.75, 1.0, 2.0];
-/// Halvings of the distance between fractions; after each, the best is replayed again on both
-/// sides.
+/// Halvings of the distance between fractions; after each, replays are tried on both sides of the
+/// best.
 ///
 /// A friction that holds a joint does so from some value on, and nearly does so just below.
 const HALVINGS: usize = 3;

@@ -1,9 +1,10 @@
-//! What is easily mistaken for a name that leads, and that no fit has seen: fitted too.
+//! Fits of effects that are easily mistaken for a leading name and that no fit has included.
 //!
-//! A screening ranks laws about the trajectory of the model without them. Dry friction turns round with each error of a speed's sign there and
-//! shows a tenth of what it is, a dead band of the drive at the same joint shows half; and once that one leads the fits, nothing far behind is
-//! raced. So what a leading law is [mistaken for](asid_effects::Effect::mistaken_for), by its own word or by that of the other, is fitted as well
-//! where it acts.
+//! A screening ranks laws about the trajectory of the model without them. Dry friction changes sign
+//! there with every error of a speed's sign, and shows a tenth of its evidence. A dead band of the
+//! drive at the same joint shows half. Once the dead band leads the fits, nothing far behind is
+//! raced. So the effects that a leading law is [mistaken for](asid_effects::Effect::mistaken_for),
+//! as either of the two declares, are fitted too if they act at the same place.
 
 use asid_core::Result;
 use asid_effects::Reach;
@@ -16,10 +17,11 @@ use super::round::Upon;
 use super::screening::Look;
 use super::set::Set;
 
-/// Names that are fitted beside the one that leads, at most: of a drive, play and friction of its joint.
+/// Most such names that are fitted: for a drive, backlash and friction of its joint.
 const MOST: usize = 2;
 
-/// Whether one candidate is easily mistaken for another one, by its own word or by that of the other, and one of them acts where the other one does.
+/// Whether two candidates are easily mistaken for each other, as either declares, and one acts on
+/// no more than the other acts on.
 pub(super) fn is_confused(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -35,7 +37,9 @@ pub(super) fn is_confused(
     is_within(&reach, &other) && (says(a, b) || says(b, a))
 }
 
-/// Whether one of two effects acts on no more than what the other one acts on. A tilt acts on all that a force on the only body does.
+/// Whether one of two effects acts on no more than what the other one acts on.
+///
+/// A tilt acts on all that a force on the only body acts on.
 fn is_within(a: &Reach, b: &Reach) -> bool {
     match (a, b) {
         (Reach::Dofs(a), Reach::Dofs(b)) => a.is_subset(b) || b.is_subset(a),
@@ -45,8 +49,11 @@ fn is_within(a: &Reach, b: &Reach) -> bool {
 }
 
 impl Upon<'_> {
-    /// Sets that were `fitted` to the end, best first, and those that have in the place of a name of the best one what is easily mistaken for it and is in
-    /// none of them: the likeliest two of the screening, fitted from its own base.
+    /// Adds to the sets that were `fitted` to the end sets with an effect that is easily mistaken
+    /// for a name of the best set; best first.
+    ///
+    /// The effect is in none of the fitted sets. The likeliest two of the screening are fitted from
+    /// the base of the round.
     pub(super) fn with_what_is_mistaken(&self, fitted: Vec<Set>, look: &Look) -> Result<Vec<Set>> {
         let Some(best) = fitted.first() else {
             return Ok(fitted);

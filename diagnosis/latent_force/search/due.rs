@@ -1,4 +1,4 @@
-//! Which sets of a screening a race tries, and in which order.
+//! The sets of a screening that a race tries, and their order.
 
 use crate::latent_force::screen::Screened;
 
@@ -7,24 +7,33 @@ use super::round::Upon;
 use super::screening::Look;
 use super::set::Set;
 
-/// Sets that are tried for each place of a race upon no effect, at most: one whose fit does not come to what stands leaves its place to the next.
-/// Upon what makes up for most of the gap few come to it.
+/// Most sets that are tried for each place of a race upon the model without effects.
+///
+/// A set whose fit does not reach the base gives its place to the next one. In later rounds few
+/// reach a base that makes up for most of the gap, so that further tries gain little.
 const TRIED: usize = 3;
 
 /// A set that a race tries.
 pub(super) struct Due<'d> {
-    /// As it was screened.
+    /// The screened set.
     pub(super) screened: &'d Screened,
-    /// Where its fit begins, if that is not where the screening has it.
+    /// Where its fit begins, if not at the screened values.
     pub(super) elsewhere: Option<&'d Set>,
     /// See [`Candidacy::is_behind`].
     pub(super) is_behind: bool,
 }
 
 impl Upon<'_> {
-    /// Sets that a race tries, first those that replays say come first, then those that are worth more than the `least`: what was replayed by what it left, the others
-    /// as they are ranked, and at last what replays have found to leave most of the gap. Where no replay closes most of it, evidence that a fit of the base
-    /// wanders by tells nothing.
+    /// The sets that a race tries, in this order:
+    ///
+    /// 1. those that replays put first;
+    /// 2. the other replayed sets, in ascending order of what they leave;
+    /// 3. the rest of the ranking;
+    /// 4. sets whose replays leave most of the gap.
+    ///
+    /// All but the first must be worth more than `least`. If no replay closes most of the gap, they
+    /// must also exceed the scatter of the base's evidence, since less evidence carries no
+    /// information.
     pub(super) fn due<'d>(
         &self,
         look: &'d Look,

@@ -1,8 +1,10 @@
-//! Each name of a set that stands is asked once more against all others (sequential replacement: Miller 2002).
+//! Tests each name of the final set once more against all other candidates (sequential replacement:
+//! Miller 2002).
 //!
-//! Forward selection takes the first name where nothing else makes up for what is missing, and what came first may have taken the place of what
-//! only shows beside the second: viscous friction that of a softer servo, where a supply sinks besides. About the trajectory of the whole set, and
-//! beside its other names, all candidates are seen as well as the one that was taken.
+//! Forward selection takes the first name when nothing else makes up for what is missing. That name
+//! may have replaced one that shows only beside the second. For example, viscous friction may stand
+//! in for a softer servo while a sagging supply is not named. About the trajectory of the whole set
+//! and beside its other names, all candidates show as well as the one that was taken.
 
 use std::collections::BTreeSet;
 
@@ -18,11 +20,14 @@ use super::second_look::members;
 use super::set::{Set, without};
 use super::{Search, open_upon};
 
-/// Sets that are tried in the place of one name, at most.
+/// Most sets that are tried in place of one name.
 const TRIED: usize = 2;
 
 impl Search<'_> {
-    /// Exchanges names of the set that a path has come to for as long as that is worth more. What was tried becomes a part of the path's last round.
+    /// Exchanges names of the best set of a path if that raises its worth by more than a
+    /// significant rise.
+    ///
+    /// The sets that were tried are added to the path's last round.
     pub(super) fn exchange(&self, mut path: Path) -> Result<Path> {
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         let laws = |set: &Set| -> BTreeSet<String> {
@@ -68,7 +73,10 @@ impl Search<'_> {
         Ok(path)
     }
 
-    /// Sets with other names in the place of some candidates of a set, fitted to the end, that are as likely to first order; but those that are `known`.
+    /// Sets with other names in place of some candidates of a set, fitted to the end; those `known`
+    /// are left out.
+    ///
+    /// To first order they are about as likely as the candidates that they replace.
     fn in_place_of(
         &self,
         set: &Set,

@@ -1,7 +1,8 @@
-//! A finer law in the place of a simpler one that stands.
+//! Replacement of a simple law of the final set by a finer one that refines it.
 //!
-//! A path ends where what is left is too little for a further name. A friction that falls with the speed may make up for less than that beyond one that does
-//! not, and is no further name: the simpler one is a part of it.
+//! A path ends when too little is left for a further name. Friction that falls with the speed may
+//! make up for less than that beyond dry friction that does not. It is no further name, since the
+//! simpler law is a part of it.
 
 use asid_core::Result;
 
@@ -12,12 +13,14 @@ use super::path::Path;
 use super::round::Upon;
 use super::set::refined_by;
 
-/// Finer laws that are tried, at most.
+/// Most finer laws that are tried.
 const TRIED: usize = 2;
 
 impl Search<'_> {
-    /// Puts a finer law in the place of a simpler one of the set that a path has come to, where it earns its evidence and closes most of what whole replays
-    /// leave. What was tried becomes a part of the path's last round.
+    /// Replaces a simple law of the best set of a path by a finer one.
+    ///
+    /// The finer law must earn its evidence and close most of what whole replays leave. The sets
+    /// that were tried are added to the path's last round.
     pub(super) fn refine(&self, mut path: Path) -> Result<Path> {
         let base = path.best.clone();
         let refines = |&c: &usize| {

@@ -1,4 +1,5 @@
-//! The end of a round: those that are not far behind are fitted to the end, and lose what does nothing in them.
+//! End of a round: sets that are not far behind are fitted to the end, and members without an
+//! effect are removed.
 
 use std::collections::BTreeSet;
 
@@ -11,23 +12,26 @@ use super::prune::{Counts, earned, pruned, pruned_at_once};
 use super::round::Upon;
 use super::set::{Set, from_fit_of, name_of};
 
-/// Sets that were fitted, and those that there was no time for.
+/// Fitted sets, and the sets for which there was no time.
 pub(super) struct Fits {
     pub(super) sets: Vec<Set>,
     pub(super) left_out: Vec<Vec<usize>>,
 }
 
 impl Upon<'_> {
-    /// Fits those that are not far behind to the end, of each other and of an evidence that another set has reached, and takes out of each what
-    /// does nothing in it.
+    /// Fits to the end the sets that are not far behind, and prunes each.
+    ///
+    /// They are compared with the best of them and with the evidence that another set has
+    /// `reached`.
     pub(super) fn finish(&self, raced: Vec<Set>, reached: f64) -> Result<Fits> {
         let (context, breadth, progress) = (self.context, self.breadth, self.progress);
         let base = self.base.fitted.evidence;
-        // What a set promises counts for it, but only what one has reached counts against the others.
+        // A set's own predicted gain counts for it; only reached evidence counts against others.
         let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
         let mut raced = raced;
         raced.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
-        // After as many rounds for each: one that was fitted to the end would be ahead by its rounds alone.
+        // Compared after equally many linearisations: a set that was fitted to the end would lead
+        // by these alone.
         let best = raced
             .iter()
             .map(|s| s.fitted.evidence)
@@ -47,7 +51,7 @@ impl Upon<'_> {
                     "fitting {}",
                     name_of(self.candidates, &set.candidates)
                 ));
-                // To the end by slopes of its own.
+                // The fit to the end uses its own derivatives.
                 set.fitted.slopes = Slopes::default();
                 let whole = Extent::from((breadth.rounds[1], progress));
                 let rival = (!context.has_segments()).then_some(best_to_the_end - breadth.near);
@@ -55,7 +59,7 @@ impl Upon<'_> {
             }
             best_to_the_end = best_to_the_end.max(set.fitted.evidence);
             let at_once = pruned_at_once(self.candidates, set.clone());
-            // Fewer members do not bring back one that is far behind.
+            // Removing members does not save a set that is far behind.
             let is_far = hoped(&at_once) < best_to_the_end - breadth.near;
             set = if progress.is_stopped() {
                 fits.left_out.push(set.candidates);
@@ -84,8 +88,10 @@ impl Upon<'_> {
         Ok(fits)
     }
 
-    /// Whether a set makes up for as much of what the one `before` leaves as a further name must: of the force, of most of it at some joint, or of the
-    /// gap of replays. Where the one before leaves neither force nor gap, a search would end with it.
+    /// Whether a set makes up for as much of what the set `before` leaves as a further name must.
+    ///
+    /// It must do so for the force, for most of the force at some joint, or for the gap of replays.
+    /// If the set before leaves neither force nor gap, nothing counts: the search would end there.
     pub(super) fn counts(&self, before: &Set, after: &Set) -> Result<bool> {
         let (context, breadth) = (self.context, self.breadth);
         let left = |s: &Set| {
@@ -113,7 +119,8 @@ impl Upon<'_> {
         }
     }
 
-    /// Fits those behind the best once more from where that one has put the starts of segments.
+    /// Refits the sets behind the best from the initial states that the best has found for its
+    /// segments.
     fn level(&self, sets: &mut [Set]) -> Result<()> {
         sets.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));
         let Some((best, others)) = sets.split_first_mut() else {

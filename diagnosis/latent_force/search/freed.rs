@@ -1,7 +1,9 @@
-//! What no search tries of an effect, such as an offset of dry friction between the two directions: freed once the effect is named.
+//! Frees parameters of an effect that no search tries, once the effect is named.
 //!
-//! A friction of `force + offset` one way and of `force - offset` the other is a symmetric one and a constant force. Such a value is therefore
-//! tried beside what stands, and in the place of a further name, which it makes needless.
+//! An example is the offset of dry friction between the two directions. A friction of
+//! `force + offset` one way and of `force - offset` the other is a symmetric friction and a
+//! constant force. So such a value is tried beside the set that stands. It is also tried in place
+//! of a further name, which it makes unnecessary.
 
 use std::collections::BTreeSet;
 
@@ -16,10 +18,11 @@ use crate::settings::Breadth;
 use super::Search;
 use super::set::{IDLE, Set, name_of, without};
 
-/// A value that was freed: its place among the values of a model, and what it is where nothing is off.
+/// A freed value: its position among the values of a model, and its null.
 type Freed = (usize, f64);
 
-/// A set's model with what is given of the effects that it names free, and which values these are; `None` where there are none.
+/// A set's model with the given values of its named effects freed, and these values; `None` if
+/// there are none.
 fn opened(candidates: &[Candidate], set: &Set) -> Option<(Hypothesis, Vec<Freed>)> {
     let fitted = &set.fitted;
     let mut hypothesis = fitted.hypothesis.clone();
@@ -39,7 +42,7 @@ fn opened(candidates: &[Candidate], set: &Set) -> Option<(Hypothesis, Vec<Freed>
             }
             unknown.free = true;
             freed.push((at + i, p.null));
-            // As uncertain as the effect itself is large.
+            // The value is as uncertain as the effect is large.
             let sizes = own.iter().zip(parameters);
             let size = sizes
                 .filter(|(_, q)| q.unit == p.unit)
@@ -53,8 +56,10 @@ fn opened(candidates: &[Candidate], set: &Set) -> Option<(Hypothesis, Vec<Freed>
     (!freed.is_empty()).then_some((hypothesis, freed))
 }
 
-/// A set with what is given of its effects fitted too, all of it at once; `None` where it has nothing of the kind, or where that does not raise its
-/// evidence above `least`. What is no larger than its uncertainty goes back to where it was.
+/// A set with all given values of its effects fitted too.
+///
+/// `None` if it has no such values, or if its evidence then does not exceed `least`. A value that
+/// is less than two deviations from its null goes back to it.
 fn fitted_freely(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -94,15 +99,18 @@ fn fitted_freely(
 }
 
 impl Search<'_> {
-    /// The set that stands with what is given of its effects free, where that earns what a name must.
+    /// The set that stands with the given values of its effects free, if that earns what a name
+    /// must.
     pub(super) fn freed(&self, best: &Set) -> Result<Option<Set>> {
         let least = best.fitted.evidence + self.threshold;
         let how = (self.breadth, self.progress);
         fitted_freely(self.context, self.candidates, (best, least), how)
     }
 
-    /// A set with a value that was given in the place of one of its laws, where its evidence is then less by no more than what a name must earn.
-    /// Segments do not ask this, for each fit of theirs costs as much as a round.
+    /// A set with a given value freed in place of one of its laws, if that costs no more evidence
+    /// than a name must earn.
+    ///
+    /// Segments do not use this rule, because each of their fits costs as much as a round.
     pub(super) fn freed_instead(&self, set: &Set) -> Result<Option<Set>> {
         let law = |c: usize| &*self.candidates[c].spec.name;
         let is_named = |c: &usize| !self.candidates[*c].is_tolerance;

@@ -1,7 +1,8 @@
-//! What a wrong first name took is given back.
+//! Removal of earlier names that a later name makes unnecessary.
 //!
-//! Forward selection cannot take back a name: a spring in series does part of what a long delay does, and beside it the delay is fitted to the
-//! rest. Without the spring the same delay is a little longer, and makes up for all.
+//! Forward selection cannot take back a name. A spring in series does a part of what a long delay
+//! does, and beside it the delay is fitted to the rest. Without the spring the same delay is a
+//! little longer, and makes up for everything.
 
 use std::collections::BTreeSet;
 
@@ -13,8 +14,11 @@ use super::Search;
 use super::set::{Set, name_of, without};
 
 impl Search<'_> {
-    /// A set without those laws of the one `before` it that its last name takes the place of, if there are any: fitted without one, the evidence is less
-    /// by no more than what a name must earn. Segments do not ask this, for each fit of theirs costs as much as a round.
+    /// A set without those laws of the set `before` that its last name makes unnecessary, if there
+    /// are any.
+    ///
+    /// A law is unnecessary if a fit without it costs no more evidence than a name must earn.
+    /// Segments do not use this rule, because each of their fits costs as much as a round.
     pub(super) fn given_back(&self, set: &Set, before: &Set) -> Result<Option<Set>> {
         let (breadth, progress) = (self.breadth, self.progress);
         let named = |c: &&usize| !self.candidates[**c].is_tolerance;

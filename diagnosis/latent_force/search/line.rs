@@ -1,24 +1,25 @@
-//! A set of a screening along the way that its slopes promise.
+//! A screened set at fractions of its predicted values.
 
 use super::set::Set;
 
-/// Ratio of two parts of the way between which no further one is tried: a fit goes on from there.
+/// Ratio of two neighbouring fractions below which no fraction between them is tried: a fit
+/// continues from there.
 const NEAR: f64 = 1.1;
 
-/// A set of a screening, replayed at some parts of the way that its slopes promise.
+/// A screened set that was replayed at some fractions of its predicted values.
 pub(super) struct Line<S = Set> {
-    /// Place among those ranked.
+    /// Position in the ranking.
     pub(super) place: usize,
-    /// At the whole of the way.
+    /// The set at its predicted values.
     pub(super) set: S,
-    /// Parts of the way, and the excess power that replays leave there, by parts.
+    /// Fractions in ascending order, each with the excess power that replays leave there.
     tried: Vec<(f64, f64)>,
-    /// Where a fit to replays has come to, after what they leave there.
+    /// The result of a fit to replays, with what the replays leave there.
     fitted: Option<(f64, S)>,
 }
 
 impl<S> Line<S> {
-    /// One that is not replayed yet.
+    /// A set that has not been replayed yet.
     pub(super) fn new(place: usize, set: S) -> Self {
         Self {
             place,
@@ -28,25 +29,27 @@ impl<S> Line<S> {
         }
     }
 
-    /// The part at which replays leave least, and its place among those tried.
+    /// Position among the fractions tried, fraction and excess power of the replays that leave
+    /// least.
     fn best(&self) -> (usize, f64, f64) {
         let all = self.tried.iter().enumerate();
         let best = all.min_by(|a, b| a.1.1.total_cmp(&b.1.1));
         best.map_or((0, 1.0, f64::INFINITY), |(i, t)| (i, t.0, t.1))
     }
 
-    /// The part of the way at which replays leave least.
+    /// Fraction whose replays leave least.
     pub(super) fn part(&self) -> f64 {
         self.best().1
     }
 
-    /// The least that replays leave.
+    /// Least excess power of all replays.
     pub(super) fn left(&self) -> f64 {
         let fitted = self.fitted.as_ref().map_or(f64::INFINITY, |f| f.0);
         self.best().2.min(fitted)
     }
 
-    /// Where a fit to replays has come to; `None` where there was none, or it leaves more than some part of the way.
+    /// The result of a fit to replays; `None` if there was no fit, or if it leaves more than some
+    /// fraction.
     pub(super) fn fitted(&self) -> Option<&S> {
         let (left, set) = self.fitted.as_ref()?;
         (*left <= self.best().2).then_some(set)
@@ -57,8 +60,10 @@ impl<S> Line<S> {
         self.fitted.is_some()
     }
 
-    /// Where to replay next: beyond the best part on the side where nothing was tried, or else in the wider gap beside it; `None` where its
-    /// neighbours are near.
+    /// Fraction to replay next; `None` if the neighbours of the best one are near.
+    ///
+    /// It lies beyond the best fraction on the side where nothing was tried, or else in the wider
+    /// gap beside it.
     pub(super) fn next(&self) -> Option<f64> {
         let (i, part, _) = self.best();
         let above = self.tried.get(i + 1).map(|t| t.0);
@@ -79,18 +84,18 @@ impl<S> Line<S> {
         (ratio > NEAR).then(|| (other * part).sqrt())
     }
 
-    /// Takes note of what replays leave at a part of the way.
+    /// Records what replays leave at a fraction.
     pub(super) fn add(&mut self, part: f64, left: f64) {
         let at = self.tried.partition_point(|t| t.0 < part);
         self.tried.insert(at, (part, left));
     }
 
-    /// Takes note of where a fit to replays has come to, and what they leave there.
+    /// Records the result of a fit to replays, and what replays leave there.
     pub(super) fn add_fitted(&mut self, left: f64, set: S) {
         self.fitted = Some((left, set));
     }
 
-    /// Parts of the way at which it was replayed.
+    /// Fractions that were replayed.
     pub(super) fn parts(&self) -> impl Iterator<Item = f64> {
         self.tried.iter().map(|t| t.0)
     }
@@ -100,7 +105,8 @@ impl<S> Line<S> {
 mod tests {
     use super::*;
 
-    /// A line of nothing, replayed until no part is due, where replays leave the least at a `best` part.
+    /// A line without a set, replayed until no fraction is due, whose replays leave least at the
+    /// fraction `best`.
     fn searched(best: f64) -> Line<()> {
         let mut line = Line::new(0, ());
         line.add(1.0, (1.0 / best).ln().abs());

@@ -1,34 +1,36 @@
-//! A fit of a few values to replays: Gauss and Newton's method with differences for slopes.
+//! Gauss-Newton fit of a few values to replays, with derivatives from finite differences.
 //!
-//! It ranks sets by what they can leave, and a real fit begins where it ends: some steps do.
+//! The fit ranks sets by what they can leave, and the fit to the logs begins where it ends. So a
+//! few steps suffice.
 
 use asid_core::{Progress, Result};
 use nalgebra::{DMatrix, DVector};
 
-/// Steps, at most.
+/// Most steps.
 const STEPS: usize = 4;
-/// Parts of a step that are tried, until one leaves less.
+/// Fractions of a step that are tried, until one leaves less.
 const PARTS: [f64; 2] = [1.0, 0.5];
-/// Share of what is left above the noise that a step must take away for a further one.
+/// Share of the power above the noise that a step must remove for a further step.
 const GAINED: f64 = 0.05;
 
-/// A value that is fitted.
+/// A value to fit.
 pub(super) struct Value {
-    /// Where it begins.
+    /// Initial value.
     pub(super) start: f64,
-    /// Difference that its slope is taken over.
+    /// Step of its finite difference.
     pub(super) step: f64,
-    /// Its least and its largest.
+    /// Lower and upper bound.
     pub(super) bounds: [f64; 2],
 }
 
-/// Residuals of some values; their squares add up to the mean square of readings in units of their noise.
+/// Residuals at some values; the sum of their squares is the mean square of readings in units of
+/// their noise.
 pub(super) type Residuals<'r> = &'r dyn Fn(&[f64]) -> Result<Vec<f64>>;
 
-/// Values at which residuals are less than at their start, and these residuals.
+/// Values whose residuals are smaller than at the start, and these residuals.
 ///
 /// # Errors
-/// When residuals cannot be had.
+/// When residuals cannot be computed.
 pub(super) fn fitted(
     residuals: Residuals<'_>,
     values: &[Value],
@@ -62,7 +64,7 @@ pub(super) fn fitted(
     Ok((at, here))
 }
 
-/// The step at which linear residuals would be least; `None` where there are no slopes.
+/// The Gauss-Newton step; `None` if the derivatives cannot be computed.
 fn step(
     residuals: Residuals<'_>,
     values: &[Value],
@@ -86,7 +88,7 @@ fn step(
     }
     let gram = slopes.tr_mul(&slopes);
     let moment = slopes.tr_mul(&here);
-    // What tells nothing stays where it is.
+    // A value that no residual depends on stays where it is.
     Ok(gram
         .svd(true, true)
         .solve(&moment, f64::EPSILON.sqrt())
@@ -112,7 +114,8 @@ mod tests {
         }
     }
 
-    /// By hand: a spring of stiffness 1/x under a load y gives way by x y; with the load itself read, both are found though each stands in for the other.
+    /// By hand: a spring of stiffness 1/x under a load y deflects by x y. With the load itself read
+    /// too, both are found, although each can stand in for the other.
     #[test]
     fn two_values_that_stand_in_for_each_other_are_told_apart() {
         let residuals = |z: &[f64]| Ok(vec![30.0 * (z[0] * z[1] - 6.0), 10.0 * (z[1] - 3.0)]);

@@ -1,4 +1,4 @@
-//! What a further name must make up for to count, beyond what stands.
+//! Tests whether a set makes up for enough to count as a further name.
 
 use asid_core::Result;
 
@@ -7,19 +7,22 @@ use super::open_loop::{MOST, OpenLoopGap};
 use super::prune::{Counts, earned};
 use super::set::Set;
 
-/// The set that stands, and what is left of it.
+/// The set that stands, and what is left with it.
 pub(super) struct Measure<'m> {
     pub(super) search: &'m Search<'m>,
     pub(super) stands: &'m Set,
-    /// Whether hardly any force is missing, so that the gap of the open loop counts.
+    /// Whether hardly any force is missing, so that the open-loop gap counts.
     pub(super) no_force: bool,
     pub(super) gap: &'m OpenLoopGap<'m>,
-    /// Whether the first fits were cut short: they have not told yet how much of the force they make up for.
+    /// Whether the first fits were cut short: they do not show yet how much of the force they make
+    /// up for.
     pub(super) cut_short: bool,
 }
 
 impl Measure<'_> {
-    /// Whether a set makes up for as much as a further name must: of the force, of most of it at some joint, or of the gap of the open loop.
+    /// Whether a set makes up for as much as a further name must.
+    ///
+    /// It must do so for the force, for most of the force at some joint, or for the open-loop gap.
     pub(super) fn counts(&self, set: &Set) -> Result<bool> {
         let (search, stands) = (self.search, self.stands);
         let (context, breadth) = (search.context, search.breadth);
@@ -41,8 +44,9 @@ impl Measure<'_> {
         }
     }
 
-    /// The first of the sets that were fitted upon a base that rises above it and counts. Where the base is no more than what is gone on from for a try, all that
-    /// is beyond what stands must be missed in it.
+    /// The first of the sets that were fitted upon a base that exceeds the base and counts.
+    ///
+    /// If `base` is only a trial base, each name beyond the set that stands must be needed.
     pub(super) fn first(&self, fitted: &[Set], base: Option<&Set>) -> Result<Option<Set>> {
         let first = self.first_above(base.unwrap_or(self.stands), fitted)?;
         match (first, base) {
@@ -54,7 +58,7 @@ impl Measure<'_> {
         }
     }
 
-    /// The first of some sets that rises above another one, and that counts.
+    /// The first of some sets that exceeds another set by the threshold and counts.
     fn first_above<'s>(&self, other: &Set, sets: &'s [Set]) -> Result<Option<&'s Set>> {
         let threshold = self.search.threshold;
         for set in sets {
@@ -66,7 +70,8 @@ impl Measure<'_> {
         Ok(None)
     }
 
-    /// A set of which several names were put upon what stands, without those that are not missed in it ([`earned`]).
+    /// Removes from a set with several names beyond the set that stands those that are not needed
+    /// ([`earned`]).
     fn missed(&self, set: Set, others: &[Set]) -> Result<Set> {
         let search = self.search;
         let upon = search.upon(self.stands, &[]);

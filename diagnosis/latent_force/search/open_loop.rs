@@ -1,4 +1,6 @@
-//! The gap of the open loop: what a further name counts by where hardly any force is missing, as of a stiff drive that was made softer.
+//! The open-loop gap, by which a further name counts if hardly any force is missing.
+//!
+//! A stiff drive that was made softer is an example.
 
 use asid_core::{Progress, Result};
 
@@ -9,35 +11,43 @@ use crate::settings::Breadth;
 
 use super::set::Set;
 
-/// Share of what the set that stands leaves of the gap that a further name must close to count by it, where it leaves the missing force as it is:
-/// more than half, as in a small gap ([`crate::decision`]). What errors add up to over a whole log may change by a few per cent for
-/// any reason.
+/// Share of the remaining gap that a further name must close to count by it, if it leaves the
+/// missing force as it is.
+///
+/// It is more than half, as for a small gap ([`crate::decision`]). Errors that accumulate over a
+/// whole log may change by a few per cent for any reason.
 pub(super) const MOST: f64 = 0.5;
 
 /// Open-loop replays of whole logs.
 #[derive(Clone, Copy)]
 pub struct OpenLoop<'o> {
-    /// Excess power that they leave of the training logs, of a set.
+    /// Excess power that replays of a set leave of the training logs.
     pub excess: &'o dyn Fn(&Set) -> Result<f64>,
-    /// Residuals of the training logs that they leave, of a set; their squares add up to the mean square in units of the noise.
+    /// Residuals that replays of a set leave of the training logs; the sum of their squares is the
+    /// mean square in units of the noise.
     pub residuals: &'o dyn Fn(&Set) -> Result<Vec<f64>>,
-    /// The same of replays that begin where the logs themselves say, as far as they do.
+    /// The same for replays from the initial states that the logs give, as far as they do.
     pub as_logged: &'o dyn Fn(&Set) -> Result<Vec<f64>>,
-    /// A set with its values fitted to them, after the excess power that they then leave.
+    /// A set with its values fitted to replays, and the excess power that is then left.
     pub fitted: &'o dyn Fn(&Set) -> Result<(f64, Set)>,
     /// States of a set along the walks, `rows x (nq + nv)` each.
     pub states: &'o dyn Fn(&Set) -> Result<Vec<Vec<f64>>>,
-    /// Physics steps of one of all training logs.
+    /// Physics steps of one replay of all training logs.
     pub steps: usize,
-    /// Whether they leave a gap without effects. Where they do not, no set could close one: a screening tells what the logs could have
-    /// shown, and nothing is fitted.
+    /// Whether replays leave a gap without effects.
+    ///
+    /// If they do not, no set could close one. The screening then gives the detection limits, and
+    /// nothing is fitted.
     pub is_gap: bool,
 }
 
 impl OpenLoop<'_> {
-    /// Whether a set rises above the one before it by a threshold: by more than what the evidence of both scatters by, or, of segments, where replays of whole
-    /// logs confirm it by most of the gap that the one before leaves with its values fitted to them. Evidence scatters by how segments begin, which these
-    /// do not depend on.
+    /// Whether a set exceeds the one before it by a threshold.
+    ///
+    /// It does if the difference also exceeds the scatter of both. In segments it also does if
+    /// replays of whole logs confirm it. They must leave less than half of what the set before
+    /// leaves, both as it is and with its values fitted to them. The evidence scatters with the
+    /// initial states of segments, and these replays do not depend on them.
     pub(super) fn rises(
         &self,
         context: &Context<'_>,
@@ -55,8 +65,10 @@ impl OpenLoop<'_> {
         Ok(most < (self.excess)(before)? && most < (self.fitted)(before)?.0)
     }
 
-    /// Whether a set closes most of the gap that the one before it leaves. A sensor that reads to another scale hardly changes which force is
-    /// missing, and all that is foretold.
+    /// Whether a set closes most of the gap that the set before it leaves.
+    ///
+    /// A sensor with a wrong scale hardly changes which force is missing, but changes all
+    /// predictions.
     pub(super) fn is_mostly_closed(
         &self,
         context: &Context<'_>,
@@ -71,15 +83,15 @@ impl OpenLoop<'_> {
     }
 }
 
-/// The gap of the open loop, which counts where hardly any force is missing.
+/// The open-loop gap, which counts if hardly any force is missing.
 pub(super) struct OpenLoopGap<'o> {
     replay: OpenLoop<'o>,
-    /// Excess power without effects and of the set that stands, once that counts.
+    /// Excess power without effects and with the set that stands; `None` if it does not count.
     excess: Option<[f64; 2]>,
 }
 
 impl<'o> OpenLoopGap<'o> {
-    /// The gap by some replays.
+    /// The gap by given replays.
     pub(super) fn by(replay: OpenLoop<'o>) -> Self {
         Self {
             replay,
@@ -87,7 +99,7 @@ impl<'o> OpenLoopGap<'o> {
         }
     }
 
-    /// Whether the set that stands leaves as much of it as a further effect must close.
+    /// Whether the set that stands leaves more of the gap than a further effect must close.
     pub(super) fn is_left(
         &mut self,
         context: &Context<'_>,
@@ -108,7 +120,7 @@ impl<'o> OpenLoopGap<'o> {
         }))
     }
 
-    /// Whether a set closes as much of it.
+    /// Whether a set closes as much of the gap as a further effect must.
     pub(super) fn is_closed_by(&self, set: &Set, breadth: Breadth) -> Result<bool> {
         Ok(match self.excess {
             Some([first, now]) => now - (self.replay.excess)(set)? > breadth.shrinks * first,

@@ -1,4 +1,4 @@
-//! A path of a search: names taken one upon the other, from a set that stands.
+//! A path of a search: names added one after the other to a set that stands.
 
 use asid_core::Result;
 
@@ -14,18 +14,18 @@ use super::{
     upon_tolerances,
 };
 
-/// How far a path has come.
+/// State of a path.
 pub(super) struct Path {
-    /// The rounds.
+    /// The rounds so far.
     pub(super) rounds: Vec<Round>,
     /// The set that stands.
     pub(super) best: Set,
-    /// What was left out because the work was stopped.
+    /// What was left out because the search was stopped.
     pub(super) untried: Vec<Untried>,
 }
 
 impl Path {
-    /// One that begins with a set.
+    /// A path that begins with a set.
     pub(super) fn from(best: Set) -> Self {
         Self {
             rounds: Vec::new(),
@@ -34,8 +34,10 @@ impl Path {
         }
     }
 
-    /// This path or another one, which began where this one's first round did: that whose end is worth more. The rounds of both are kept, those
-    /// of the better one last.
+    /// Joins this path with one that began from another set of its first round; the end that is
+    /// worth more stands.
+    ///
+    /// The rounds of both are kept, those of the better path last.
     pub(super) fn or(mut self, mut other: Self, worth: impl Fn(&Set) -> f64) -> Self {
         self.untried.append(&mut other.untried);
         let own = self.rounds.split_off(self.rounds.len().min(1));
@@ -52,8 +54,12 @@ impl Path {
 }
 
 impl Search<'_> {
-    /// The second of the sets that the first round of a path has fitted to the end, where something was missing beside the one that was taken: where it is
-    /// as likely as that but for what a name must earn, or where the path ends though a further name earns its evidence, which what was taken may have left.
+    /// The set of the first round from which a second path begins, if something was missing beside
+    /// the set that was taken.
+    ///
+    /// The set must be nearly as likely as the one taken: the difference is below the threshold of
+    /// a name. Any distance is allowed if the path ends although a further name earns its evidence,
+    /// since the set that was taken may have left that evidence.
     pub(super) fn second(&self, path: &Path) -> Option<Set> {
         let [first, further, ..] = &path.rounds[..] else {
             return None;
@@ -78,12 +84,15 @@ impl Search<'_> {
         best.cloned()
     }
 
-    /// Names one candidate upon the other for as long as they earn it. `none` is the model without effects, fitted, which becomes a better fit
-    /// of it where one is found.
+    /// Adds names one after the other as long as they earn it.
     ///
-    /// One that earns its evidence and makes up for too little to count is gone on from once, where nothing else does: of a drive that answers late and a
-    /// sensor that drifts, neither closes much of the gap by itself, and both close all of it. What comes of that stands if all of it counts and each
-    /// part is missed.
+    /// `none` is the fitted model without effects; a better fit of it replaces it when one is
+    /// found.
+    ///
+    /// If no set counts, a name that earns its evidence and makes up for too little to count is
+    /// used once as a trial base. For example, neither a late drive nor a drifting sensor closes
+    /// much of the gap alone, and both together close all of it. The result stands if it counts as
+    /// a whole and each part is needed.
     pub(super) fn follow(&self, mut path: Path, none: &mut Fitted) -> Result<Path> {
         let Search {
             context,
@@ -96,7 +105,7 @@ impl Search<'_> {
         } = *self;
         let how = (breadth, progress);
         let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
-        // What is gone on from though it does not count by itself.
+        // Trial base that does not count by itself.
         let mut tentative: Option<Set> = None;
         let mut depth = breadth.depth.saturating_sub(path.best.names);
         let mut gap = OpenLoopGap::by(self.open_loop);
@@ -105,7 +114,7 @@ impl Search<'_> {
             if no_force && !gap.is_left(context, (none, &path.best), how)? {
                 break;
             }
-            // The first screening is the least that an answer rests on.
+            // The first screening always runs: it is the least that an answer rests on.
             if !path.rounds.is_empty() && progress.is_stopped() {
                 path.untried.push(Untried::upon(&path.best, FURTHER));
                 break;
@@ -145,7 +154,7 @@ impl Search<'_> {
                 continue;
             };
             if has_tolerances(candidates, &next) && !has_tolerances(candidates, best) {
-                // They are no name.
+                // Tolerances are no name.
                 depth += 1;
             }
             let smaller = match self.freed_instead(&next)? {
@@ -171,7 +180,7 @@ impl Search<'_> {
         Ok(path)
     }
 
-    /// A round upon a set, and the sets that it has fitted to the end.
+    /// Runs a round upon a set, and returns it with the sets that it has fitted to the end.
     fn round(&self, base: &Set, untried: &mut Vec<Untried>) -> Result<(Round, Vec<Set>)> {
         let open = open_upon(self.candidates, self.known, base);
         let round = self.upon(base, &open).round(untried)?;
@@ -179,7 +188,7 @@ impl Search<'_> {
         Ok((round, confirmed))
     }
 
-    /// What a round upon a set is about, of its `open` candidates.
+    /// The input of a round upon a set, with its `open` candidates.
     pub(super) fn upon<'u>(&'u self, base: &'u Set, open: &'u [usize]) -> Upon<'u> {
         Upon {
             context: self.context,

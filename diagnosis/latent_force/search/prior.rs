@@ -1,4 +1,6 @@
-//! Prior odds of the effects of a set. Each further name has a price besides: the logarithm of the number of candidates
+//! Prior odds of the effects of a set.
+//!
+//! Each further name also pays a price: the logarithm of the number of candidates
 //! ([`crate::decision`]).
 
 use std::collections::BTreeSet;
@@ -10,22 +12,27 @@ use crate::latent_force::context::Context;
 
 use super::set::Set;
 
-/// Prior odds against an effect at a site where it comes to mind only after others.
+/// Prior odds against an effect that is an unlikely explanation at its site.
 const UNUSUAL: f64 = 10.0;
 
-/// Prior odds for an effect at a site where another one is that it goes with: as much as an unusual one is less likely.
+/// Prior odds for an effect at a site with another effect that it goes with: the same factor as for
+/// an unusual one.
 const TOGETHER: f64 = 10.0;
 
-/// Evidence of a set, that of effects at unusual sites the lower. One that names something pays for which of all it is: tolerances, which every
-/// machine has, are one rival.
+/// Evidence of a set with its prior odds and the price of its names.
+///
+/// A set pays for each name, for being one of all candidates. Tolerances pay nothing, since every
+/// machine has them.
 pub(super) fn worth(context: &Context<'_>, candidates: &[Candidate], set: &Set) -> f64 {
     let prior = log_prior(context.plant(), candidates, &set.candidates);
     let price = (nameable(candidates) as f64).ln();
     set.fitted.evidence + prior - price * set.names as f64
 }
 
-/// Logarithm of the prior odds of some candidates, natural: less by each law that is unusual where it is, which counts once at
-/// however many joints, and more by each that goes with another one of them where it is.
+/// Logarithm of the prior odds of some candidates, in nats.
+///
+/// Each law that is unusual at its site lowers it, once for any number of joints. Each law that
+/// goes with another one at its site raises it.
 #[must_use]
 pub fn log_prior(plant: &Plant, candidates: &[Candidate], set: &[usize]) -> f64 {
     let each = set.iter().map(|&c| &candidates[c]);

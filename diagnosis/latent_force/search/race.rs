@@ -1,4 +1,4 @@
-//! The race of a round: what leads in a screening is fitted a little.
+//! Race of a round: the leading sets of a screening are fitted briefly.
 
 use asid_core::Result;
 
@@ -10,9 +10,13 @@ use super::set::{Set, name_of};
 use super::tolerances::Tolerances;
 
 impl Upon<'_> {
-    /// Fits what leads in a screening a little; tolerances too where they are not far behind. Once a set leaves no gap of replays, upon no effect, only
-    /// those are fitted besides that a screening puts within a part of what it has come to ([`Breadth::behind`](crate::settings::Breadth::behind)), and its own law
-    /// at more places: the others would have to close the gap too, and be ahead of it.
+    /// Fits the leading sets of a screening briefly, and tolerances too unless they are far behind.
+    ///
+    /// Once a set upon the model without effects leaves no gap of replays, sets that the screening
+    /// puts far behind it are skipped. A set is far behind if its screened evidence is below a
+    /// share ([`Breadth::behind`](crate::settings::Breadth::behind)) of what that set has gained.
+    /// It would have to close the gap too, and be ahead. The closing set's own law at more sites is
+    /// still tried.
     pub(super) fn race(&self, look: &Look, tolerances: Option<&Tolerances>) -> Result<Fits> {
         let (breadth, progress) = (self.breadth, self.progress);
         let ranked = &look.ranked;
@@ -29,7 +33,7 @@ impl Upon<'_> {
         let mut near = tolerances.filter(|t| t.gain > not_far);
         for (place, due) in due.into_iter().enumerate() {
             let s = due.screened;
-            // One that has not come to what stands leaves its place to the next.
+            // A set that has not reached the base gives its place to the next.
             if risen == breadth.raced {
                 break;
             }
@@ -39,7 +43,7 @@ impl Upon<'_> {
             if (s.worth(price) < far || is_out) && !holds {
                 continue;
             }
-            // What leads comes first: where time is out, an answer rests on it.
+            // The leader is always fitted: if time is out, the answer rests on it.
             if place > 0 && progress.is_stopped() {
                 left_out.push(members);
                 continue;
@@ -66,7 +70,7 @@ impl Upon<'_> {
         Ok(Fits { sets, left_out })
     }
 
-    /// Tolerances beside the base, fitted a little, where there are any.
+    /// Tolerances added to the base and fitted briefly, if there are any.
     fn tried(&self, tolerances: Option<&Tolerances>) -> Result<Option<Set>> {
         let Some(tolerances) = tolerances else {
             return Ok(None);
@@ -77,9 +81,11 @@ impl Upon<'_> {
         Ok(Some(set))
     }
 
-    /// Where a group leads those that were `raced`, the best law at one place with tolerances beside it, fitted a little: one law at all
-    /// places makes up for many small things as they do, and is not there where one is strong at one place and small things are the rest. With
-    /// the group beside tolerances too where it falls behind that.
+    /// If a group leads the `raced` sets, the best law at one site with tolerances, fitted briefly.
+    ///
+    /// One law at all sites makes up for many small errors, as tolerances do. It is not there if it
+    /// is strong at one site only and the rest is small errors. If the group falls behind that, it
+    /// is fitted with tolerances too.
     pub(super) fn beside_tolerances(
         &self,
         tolerances: Option<&Tolerances>,

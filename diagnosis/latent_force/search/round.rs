@@ -1,4 +1,5 @@
-//! A round of a search: all open candidates are screened upon a set, and the few that lead are fitted.
+//! A round of a search: all open candidates are screened upon a set, and the leading ones are
+//! fitted.
 
 use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
@@ -17,22 +18,23 @@ use super::screening::{Look, Screening, Sight};
 use super::set::{Set, TOLERANCES, name_of, refined, refined_by, with};
 use super::tolerances::Tolerances;
 
-/// A round: what was screened and what was fitted upon a base.
+/// What was screened and fitted upon a base in a round.
 #[derive(Clone, Debug)]
 pub struct Round {
     /// Candidates of the base.
     pub base: Vec<usize>,
-    /// What was screened, best first.
+    /// Screened sets, best first.
     pub screened: Vec<Seen>,
-    /// The leading candidates of screening, and the cosines of the smallest principal angle between each two.
+    /// The leading candidates of the screening, and the cosines of the smallest principal angle
+    /// between each two.
     pub alike: (Vec<usize>, DMatrix<f64>),
-    /// What could have been seen upon the base.
+    /// What the screening could have shown upon the base.
     pub sight: Sight,
-    /// Candidates of the sets that were fitted a little.
+    /// Candidates of the sets that were fitted briefly.
     pub raced: Vec<Vec<usize>>,
-    /// Sets that were fitted to the end, best first.
+    /// Sets fitted to the end, best first.
     pub confirmed: Vec<Set>,
-    /// What an ordinary machine has of everything, where that earns its place to first order.
+    /// Tolerances, if they earn their place to first order.
     pub tolerances: Option<Tolerances>,
 }
 
@@ -41,13 +43,13 @@ pub struct Round {
 pub struct Seen {
     /// The candidates.
     pub set: Vec<usize>,
-    /// How many named things they are.
+    /// Number of names; a group counts once.
     pub names: usize,
-    /// Evidence upon the base, with the prior odds.
+    /// Evidence upon the base, prior odds included.
     pub gain: f64,
 }
 
-/// What a round is about.
+/// Input of a round.
 #[derive(Clone, Copy)]
 pub(super) struct Upon<'r> {
     pub(super) context: &'r Context<'r>,
@@ -55,7 +57,7 @@ pub(super) struct Upon<'r> {
     pub(super) base: &'r Set,
     /// What is missing without effects.
     pub(super) at_first: Missing,
-    /// All candidates, and the places of those that are open.
+    /// All candidates, and the indices of those that are open.
     pub(super) candidates: &'r [Candidate],
     pub(super) open: &'r [usize],
     pub(super) breadth: Breadth,
@@ -65,7 +67,8 @@ pub(super) struct Upon<'r> {
 }
 
 impl Screening {
-    /// What a round was, once it is over: what was `screened`, what was raced and confirmed, and tolerances that earn their place.
+    /// Converts a screening that is over into a round, with the sets that were `screened`, raced
+    /// and confirmed, and tolerances that earn their place.
     fn round(
         self,
         upon: &Upon<'_>,
@@ -86,7 +89,7 @@ impl Screening {
 }
 
 impl Upon<'_> {
-    /// Screens the open candidates and fits the few that lead.
+    /// Screens the open candidates and fits the leading ones.
     ///
     /// # Errors
     /// When the engine fails.
@@ -124,7 +127,7 @@ impl Upon<'_> {
         let threshold = self.threshold();
         let tolerances = screening.tolerances.as_ref();
         let tolerances = tolerances.filter(|t| t.gain > threshold).cloned();
-        // One name that tells as much as many small things is the likelier.
+        // One name with as much evidence as many small errors is the more likely.
         let least = screening.of_names + threshold;
         if let Some(leading) = tolerances.as_ref().filter(|t| t.gain > least) {
             progress.note("fitting tolerances");
@@ -156,23 +159,23 @@ impl Upon<'_> {
         Ok(screening.round(self, screened, (of_race, confirmed), tolerances))
     }
 
-    /// What a person is told of a set of a screening.
+    /// Name of a screened set, as users see it.
     pub(super) fn named(&self, look: &Look, screened: &Screened) -> String {
         name_of(self.candidates, &self.members(look, screened))
     }
 
-    /// Evidence by which a name must rise above what stands.
+    /// Evidence by which a name must exceed the base.
     pub(super) fn threshold(&self) -> f64 {
         threshold(nameable(self.candidates), self.breadth.false_alarms)
     }
 
-    /// Candidates of a set of a screening.
+    /// Candidates of a screened set.
     pub(super) fn members(&self, look: &Look, set: &Screened) -> Vec<usize> {
         let candidate = |&f: &usize| self.open[look.columns.forms[f].candidate];
         set.forms.iter().map(candidate).collect()
     }
 
-    /// The base with the candidates of a set of a screening; a finer law takes the place of the simpler one.
+    /// The base with the candidates of a screened set; a finer law replaces the simpler one.
     pub(super) fn enlarged(&self, look: &Look, screened: &Screened) -> Set {
         let Look { some, columns, .. } = look;
         let base = self.base;

@@ -1,4 +1,5 @@
-//! A screening: all open candidates as columns of one regression upon a set, and what that could have seen.
+//! Screening: all open candidates as columns of one regression upon a set, and its detection
+//! limits.
 
 use asid_core::Result;
 use nalgebra::DMatrix;
@@ -16,23 +17,25 @@ use super::prior::log_prior;
 use super::round::Upon;
 use super::tolerances::{Tolerances, of_names};
 
-/// Leading candidates that are compared pair by pair.
+/// Leading candidates that are compared in pairs.
 const COMPARED: usize = 20;
 
-/// Sets that lead on a part of the logs, whose members are looked at on all of them: twice as many as are [raced](crate::settings::Breadth), for
-/// a part ranks them a little otherwise.
+/// Leading sets on a part of the logs whose members are then screened on all of them.
+///
+/// These are twice as many sets as are [raced](crate::settings::Breadth), because a part ranks them
+/// slightly differently.
 const LEADING: usize = 16;
 
-/// What a screening could have seen.
+/// What a screening could have shown.
 #[derive(Clone, Debug, Default)]
 pub struct Sight {
-    /// The least that each candidate must be.
+    /// The detection limit of each candidate.
     pub limits: Vec<Limit>,
-    /// What screenings of drawn logs say.
+    /// Results of screenings of simulated logs.
     pub rehearsal: Rehearsal,
 }
 
-/// The open candidates, their columns, and the sets of them by evidence.
+/// The open candidates, their columns, and their sets ranked by evidence.
 pub(super) struct Look {
     pub(super) some: Vec<Candidate>,
     pub(super) columns: Columns,
@@ -41,19 +44,19 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// Whether a form has no slope at its null.
+    /// Whether a form has no derivative at its null.
     pub(super) fn is_secant(&self, form: usize) -> bool {
         self.columns.forms[form].slopes.iter().all(Option::is_none)
     }
 }
 
-/// A screening: a look at the open candidates, and what it tells beside their ranks.
+/// A screening: the ranked candidates, and further results.
 pub(super) struct Screening {
     pub(super) look: Look,
     /// Leading candidates, and the cosines between each two.
     pub(super) alike: (Vec<usize>, DMatrix<f64>),
     pub(super) sight: Sight,
-    /// What an ordinary machine has of everything, and the evidence of the best few names.
+    /// The tolerances, and the evidence of the best few names.
     pub(super) tolerances: Option<Tolerances>,
     pub(super) of_names: f64,
 }
@@ -87,7 +90,7 @@ impl Upon<'_> {
         })
     }
 
-    /// Looks at the open candidates, and at what such a look could have seen.
+    /// Ranks the open candidates, and computes what the screening could have shown.
     pub(super) fn screen(&self) -> Result<Screening> {
         let look = self.look(Pairs::BeyondTheSum)?;
         let Look {
@@ -119,12 +122,14 @@ impl Upon<'_> {
         })
     }
 
-    /// Price of a further name: the logarithm of how many there are to choose from.
+    /// Price of a further name: the logarithm of the number of candidates.
     pub(super) fn price(&self) -> f64 {
         (nameable(self.candidates).max(1) as f64).ln()
     }
 
-    /// Which candidates lead by columns along a part of the logs: members of the leading sets, and tolerances, which are judged all at once.
+    /// Which candidates lead by columns along a part of the logs.
+    ///
+    /// These are the members of the leading sets, and tolerances, which are judged all at once.
     fn leads(&self, columns: &Columns, some: &[Candidate], pairs: Pairs) -> Vec<bool> {
         let estimate = at_own_scales(self.context, &self.base.fitted.estimate, columns);
         let scales = Scales::of(self.context, &estimate, (columns, some));
@@ -139,7 +144,8 @@ impl Upon<'_> {
         leads
     }
 
-    /// What a screening could have seen whose best candidate has the evidence `found`, at the most likely of the scales of `q`.
+    /// What a screening could have shown, at the most likely of the scales of `q`; `found` is the
+    /// evidence of its best candidate.
     fn sight(
         &self,
         (sums, found): (&[Regression], f64),

@@ -1,9 +1,10 @@
-//! A second look at all candidates, about the trajectory of what leads.
+//! Second screening of all candidates, about the trajectory of the leading set.
 //!
-//! The first screening is about the trajectory of the model without effects. Its speeds are as rough as the missing force lets them be, and
-//! what depends on them is seen badly: dry friction turns round with each error of a speed's sign. What a first set makes up for, whether it is the
-//! right one or not, leaves a trajectory that is nearly the machine's. About that one each candidate is asked what it would do in the
-//! place of the set.
+//! The first screening uses the trajectory of the model without effects. Its speeds are as rough as
+//! the missing force allows, and effects that depend on them show badly: dry friction changes sign
+//! with each error of a speed's sign. The first set, whether right or not, makes up for a part of
+//! the force. So its trajectory is nearly that of the machine. About it each candidate is screened
+//! in place of the set.
 
 use std::collections::BTreeSet;
 
@@ -19,17 +20,17 @@ use super::screening::Look;
 use super::set::{Set, name_of, shared_values, simplest_first, without};
 use super::tolerances::Tolerances;
 
-/// Sets that a second look tries, at most: as many as a round fits to the end.
+/// Most sets that a second look tries: as many as a round fits to the end.
 const TRIED: usize = 3;
 /// Share of the leader's evidence that a set needs to be tried.
 const SHARE: f64 = 0.5;
 
-/// Candidates of a set, in whatever order they were added.
+/// Candidates of a set, regardless of the order in which they were added.
 pub(super) fn members(set: &Set) -> BTreeSet<usize> {
     set.candidates.iter().copied().collect()
 }
 
-/// Some sets and further ones; of those with the same members the one with more evidence.
+/// Joins two lists of sets; of two sets with the same members the one with more evidence is kept.
 pub(super) fn joined(mut sets: Vec<Set>, further: Vec<Set>) -> Vec<Set> {
     for set in further {
         match sets.iter_mut().find(|s| members(s) == members(&set)) {
@@ -42,10 +43,12 @@ pub(super) fn joined(mut sets: Vec<Set>, further: Vec<Set>) -> Vec<Set> {
 }
 
 impl Upon<'_> {
-    /// Sets that were `fitted` to the end and, upon no effect, what a second look finds in their place, best first. None is taken where the set that
-    /// led the `first` look leads the fits too, with no less evidence than it had shown: that look has seen well. Where a pair leads that was named
-    /// at once, the better of the two with what an ordinary machine has of everything beside it is a rival, as it would be of a name that
-    /// comes after it.
+    /// Adds to the sets that were `fitted` to the end those that a second look finds, best first.
+    ///
+    /// The second look is only for the model without effects. It is skipped if the leader of the
+    /// `first` look leads the fits too, with no less evidence than it showed there. A pair that was
+    /// named at once may then lead. In that case the better of its two names is a rival with
+    /// tolerances, as it would be of a name added after it.
     pub(super) fn with_a_second_look(
         &self,
         fitted: Vec<Set>,
@@ -77,7 +80,8 @@ impl Upon<'_> {
         Ok(sets)
     }
 
-    /// A set of several names without the one that is missed least, tolerances beside it, fitted a little.
+    /// A set of several names without the one whose removal costs least, with tolerances added,
+    /// fitted briefly.
     fn fewer_with(&self, tolerances: &Tolerances, several: &Set) -> Result<Option<Set>> {
         let law = |c: usize| &*self.candidates[c].spec.name;
         let is_added =
@@ -109,7 +113,7 @@ impl Upon<'_> {
         Ok(Some(set))
     }
 
-    /// Whether the candidates of a set are those that some look has ranked together.
+    /// Whether the candidates of a set are those of a ranked set of a screening.
     fn are_members(&self, look: &Look, ranked: &Screened, set: &Set) -> bool {
         let own: BTreeSet<usize> = self.members(look, ranked).into_iter().collect();
         own == members(set)
@@ -123,7 +127,8 @@ impl Upon<'_> {
         sets
     }
 
-    /// What a screening about the trajectory of the `best` of some sets finds in its place, fitted to the end, without those that were `fitted`.
+    /// Fits to the end what a screening about the trajectory of the `best` set finds in its place,
+    /// without the sets that were `fitted`.
     fn in_place_of(&self, best: &Set, fitted: &[Set]) -> Result<Vec<Set>> {
         let mut base = self.base.clone();
         base.fitted.estimate = best.fitted.estimate.clone();
@@ -140,7 +145,7 @@ impl Upon<'_> {
         self.progress.ranking("second look", &rows);
         let price = self.price();
         let lead = ranked.first().map_or(0.0, |s| s.worth(price));
-        // About its own trajectory the best one is seen as well as any other.
+        // About its own trajectory the best set shows as well as any other.
         let own = ranked.iter().find(|s| about.are_members(&look, s, best));
         let own = own.map_or(0.0, |s| s.worth(price) - self.breadth.near);
         let least = own.max(SHARE * lead);

@@ -21,10 +21,10 @@ use crate::latent_force::smoother::Regression;
 use super::has_tolerances;
 use super::set::Set;
 
-/// Standard deviations that a tolerance is wide.
+/// Standard deviations of the prior that a tolerance spans on either side of the null.
 const DEVIATIONS: f64 = 3.0;
-/// Least information about a value, in squared deviations of its tolerance, below which it is not
-/// fitted: its evidence is about half of that.
+/// Information about a value, in units of its tolerance's deviation, below which it is not fitted:
+/// its evidence is about half of that.
 const LEAST_INFORMATION: f64 = 0.1;
 /// Most names that tolerances are compared with in a screening: what the first three do not make up
 /// for is many small things.

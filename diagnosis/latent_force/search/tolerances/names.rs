@@ -38,8 +38,9 @@ impl Tolerances {
         Ok(stands.then_some(with))
     }
 
-    /// Settles the names of a fitted set with tolerances: names values that exceed their tolerance,
-    /// and removes names that add nothing.
+    /// Settles the names of a fitted set with tolerances.
+    ///
+    /// Values that exceed their tolerance are named, and names that add nothing are removed.
     pub(in crate::latent_force::search) fn settled(
         &self,
         context: &Context<'_>,
