@@ -1,4 +1,4 @@
-//! The noise by what the best explanation leaves, which hides least of it.
+//! The noise as estimated from the residuals of the best explanation, which hide the least of it.
 
 use asid_core::Result;
 
@@ -11,19 +11,24 @@ use crate::noise::{estimate, step};
 use crate::prepare::reading_noise;
 use crate::study::Study;
 
-/// Deviation that is left, relative to the one that the readings alone told, from which on it is taken. Two estimates of white noise differ by a few per
-/// cent, those of slow noise by a third and more.
+/// Ratio of the residuals' standard deviation to that from the readings alone, from which on the
+/// former is used.
+///
+/// Two estimates of white noise differ by a few percent, those of slow noise by a third and more.
 const SLOW: f64 = 1.2;
 
-/// Noise of a sensor by what is left, and the most that its readings allow.
+/// Noise of a sensor from the residuals, and the most that its readings allow.
 struct Left {
     deviation: f64,
     most: f64,
 }
 
-/// Takes the noise of sensors from what the best explanation leaves where it is larger than the readings alone told: noise that is slow
-/// beside what the machine does tells of its size only without the motion. It is no larger than the readings allow. Errors of a rounding are
-/// alike from row to row too, and their size is known.
+/// Uses the noise from the best explanation's residuals for sensors where it is larger than from
+/// the readings alone.
+///
+/// Noise that is slow compared with the motion shows its size only without the motion. It is at
+/// most what the readings allow. Rounding errors are correlated from row to row as well, but their
+/// size is known.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -53,14 +58,16 @@ pub fn with_slow_noise(
     Ok(())
 }
 
-/// Takes the noise of all sensors from what the best explanation leaves. It is no larger than it was: what an explanation misses may look like noise.
+/// Uses the noise from the best explanation's residuals for all sensors, if it is smaller: what an
+/// explanation misses may look like noise.
 pub fn with_noise_left(bench: &mut Bench, study: &Study, findings: &mut Findings) {
     let least =
         |before: f64, left: Left, given: Option<f64>| given.unwrap_or(before.min(left.deviation));
     with_noise(bench, study, findings, least);
 }
 
-/// Sets the noise of each sensor, from what it was, what is left and what the study gives, and all that is told in units of it.
+/// Sets the noise of each sensor from the old value, the residuals and the study, and rescales
+/// everything in units of it.
 fn with_noise(
     bench: &mut Bench,
     study: &Study,
@@ -81,7 +88,7 @@ fn with_noise(
     }
 }
 
-/// Noise of each sensor by what the best explanation leaves.
+/// Estimates the noise of each sensor from the residuals of the best explanation.
 fn left(logs: &Logs, findings: &Findings) -> Vec<Left> {
     let found = findings.found.iter().map(|f| &f.explanation.fit);
     let best = found.fold(&findings.none.fit, |best, fit| {
@@ -100,13 +107,14 @@ fn left(logs: &Logs, findings: &Findings) -> Vec<Left> {
     .collect()
 }
 
-/// Residuals in the sensors' units, one array an episode; NaN where a reading is missing.
+/// Returns the residuals in the sensors' units, one array per episode; NaN where a reading is
+/// missing.
 fn in_units(logs: &Logs, residuals: &[f64]) -> Vec<Vec<f64>> {
     let noise = logs.entry_noise();
     let of_episode = |e: usize| {
         let own = &residuals[logs.offset(e)..logs.offset(e + 1)];
         let mut out = vec![0.0; own.len()];
-        // Zero where a reading is there.
+        // Zero where there is a reading, NaN where there is none.
         logs.difference(e, &logs.episodes[e].readings, &mut out);
         for (k, (out, r)) in out.iter_mut().zip(own).enumerate() {
             *out += r * noise[k % noise.len()];
@@ -116,7 +124,7 @@ fn in_units(logs: &Logs, residuals: &[f64]) -> Vec<Vec<f64>> {
     (0..logs.episodes.len()).map(of_episode).collect()
 }
 
-/// Tells a fit in units of another noise: `factors` times as large, one an entry.
+/// Converts a fit to the units of another noise, `factors` times as large, one per entry.
 fn rescale(fit: &mut Fit, factors: &[f64]) {
     let factor = |k: usize| factors[k % factors.len()];
     for (k, r) in fit.residuals.iter_mut().enumerate() {
@@ -168,7 +176,7 @@ mod tests {
         rescale(&mut fit, &[2.0, 1.0]);
         assert_eq!(fit.residuals, [1.0, 4.0]);
         assert_eq!(fit.cost, 17.0);
-        // The same readings move the value as far, and both are as uncertain now.
+        // The same readings move the value as far, and now both have the same uncertainty.
         assert_eq!(fit.answer(&fit.residuals), answer);
         assert!((fit.covariance[(0, 0)] - 2.0).abs() < 1e-12);
     }

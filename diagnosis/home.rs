@@ -1,18 +1,21 @@
-//! Where a machine without a keyframe is before it moves: what no sensor reads of a start is taken from there.
+//! Initial state of a machine without a keyframe: coordinates of an initial state that no sensor
+//! reads are taken from it.
 //!
-//! The default state of a model is where its document places its bodies: a vehicle whose wheels just touch the ground falls by a millimetre
-//! from there, and its accelerometer reads free fall. The machine has stood still before its log: where the model comes to rest
-//! under the first command, and replays of the logs' first rows from there leave less, it begins there.
+//! The default state of a model is where its document places its bodies. A vehicle whose wheels
+//! just touch the ground falls by a millimetre from there, and its accelerometer reads free fall.
+//! The machine has stood still before its log. So it begins where the model comes to rest under the
+//! first command, if replays of the logs' first rows from there leave less.
 
 use asid_core::layout::{Keyframe, Layout};
 use asid_core::{BatchConfig, Control, Model, Recording, Result, Rollout, Simulator};
 
 /// Time in which a machine comes to rest, s: some periods of a body on its contacts.
 const SETTLES: f64 = 2.0;
-/// Speed of what is at rest, m/s or rad/s: over a log of some seconds it moves by less than a sensor tells.
+/// Speed below which a coordinate is at rest, m/s or rad/s: over a log of some seconds it moves by
+/// less than a sensor resolves.
 const REST: f64 = 1e-3;
 
-/// A simulation of a model, and a recording of its state.
+/// Makes a simulation of a model, and a recording of its state.
 fn simulation(model: &dyn Model) -> Result<(Box<dyn Simulator>, Recording)> {
     let layout = model.layout();
     let config = BatchConfig {
@@ -24,7 +27,7 @@ fn simulation(model: &dyn Model) -> Result<(Box<dyn Simulator>, Recording)> {
     Ok((model.simulator(&config)?, recording))
 }
 
-/// A state as a keyframe.
+/// Makes a keyframe of a state.
 fn keyframe(layout: &Layout, state: &[f64], ctrl: &[f64]) -> Keyframe {
     let (qpos, qvel) = state.split_at(layout.nq);
     Keyframe {
@@ -35,7 +38,7 @@ fn keyframe(layout: &Layout, state: &[f64], ctrl: &[f64]) -> Keyframe {
     }
 }
 
-/// The state that a model without a keyframe is reset to, without commands.
+/// Returns the state to which a model without a keyframe is reset, without commands.
 ///
 /// # Errors
 /// When the engine fails.
@@ -48,7 +51,7 @@ pub(crate) fn default_state(model: &dyn Model) -> Result<Keyframe> {
     Ok(keyframe(layout, &state, &vec![0.0; layout.nu()]))
 }
 
-/// Where a model comes to rest from a state under a command; `None` where it does not.
+/// Returns where a model comes to rest from a state under a command; `None` if it does not.
 ///
 /// # Errors
 /// When the engine fails.

@@ -3,31 +3,33 @@
 /// A set of effects with its probability.
 #[derive(Clone, Debug, Default)]
 pub struct Hypothesis {
-    /// Place in the findings of what was fitted; `None` for no effect, and for a set that was screened only.
+    /// Index in the findings of the fitted set; `None` for no effect, and for a set that was only
+    /// screened.
     pub found: Option<usize>,
-    /// Labels, sorted.
+    /// Labels of its effects, sorted.
     pub labels: Vec<String>,
     /// Probability.
     pub probability: f64,
 }
 
-/// What the probability of a named verdict goes with.
+/// Inputs to the probability of a named verdict.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Claim {
-    /// Log odds of the verdict, and of what the logs do not tell from it, among the hypotheses, by evidence alone.
+    /// Log odds, by evidence alone, of the verdict and the sets that the logs do not distinguish
+    /// from it.
     pub odds: f64,
     /// Whether the search was cut short: 0 or 1.
     pub stopped: f64,
     /// Logarithm of the share of the gap that the verdict leaves.
     pub left: f64,
-    /// Laws that it names beside the first.
+    /// Number of laws that it names beside the first.
     pub more: f64,
 }
 
-/// What kind of answer, with its probability.
+/// The kind of answer, with its probability.
 #[derive(Clone, Debug)]
 pub struct Judgement {
-    /// All sets, most probable first.
+    /// All sets, the most probable first.
     pub hypotheses: Vec<Hypothesis>,
     /// Probability that nothing in the catalogue explains the gap.
     pub unknown: f64,
@@ -35,16 +37,17 @@ pub struct Judgement {
     pub is_unknown: bool,
     /// Index in `hypotheses` of the best explanation, whether or not it is the verdict.
     pub best: usize,
-    /// Indices of hypotheses that these data cannot tell from it.
+    /// Indices of hypotheses that these data do not distinguish from the best.
     pub ambiguous: Vec<usize>,
-    /// Share of the excess that the best leaves.
+    /// Share of the excess that the best explanation leaves.
     pub rest: f64,
-    /// What the probability of the verdict goes with, once it is calibrated and where it names something.
+    /// Inputs to the verdict's probability, once it is calibrated, and if it names something.
     pub claim: Option<Claim>,
 }
 
 impl Judgement {
-    /// Of hypotheses by their weights, which share what `unknown` leaves; `ambiguous` cannot be told from the best.
+    /// Makes a judgement of weighted hypotheses, which share what `unknown` leaves; `ambiguous`
+    /// ones are not distinguished from the best.
     pub(crate) fn of(
         mut hypotheses: Vec<Hypothesis>,
         (best, ambiguous): (usize, Vec<usize>),
@@ -54,7 +57,7 @@ impl Judgement {
         for h in &mut hypotheses {
             h.probability *= (1.0 - unknown) / sum;
         }
-        // Here it is decided.
+        // The verdict is decided here.
         let is_unknown = unknown > hypotheses[best].probability;
         let mut judgement = Self {
             is_unknown,
@@ -69,7 +72,7 @@ impl Judgement {
         judgement
     }
 
-    /// Most probable first.
+    /// Sorts the hypotheses, the most probable first.
     pub(crate) fn sort(&mut self) {
         let mut order: Vec<usize> = (0..self.hypotheses.len()).collect();
         let p = |i: usize| self.hypotheses[i].probability;
@@ -83,13 +86,14 @@ impl Judgement {
         self.ambiguous = ambiguous;
     }
 
-    /// The best explanation, whether or not it is the verdict: that may be `unknown`.
+    /// Returns the best explanation, whether or not it is the verdict, which may be `unknown`.
     #[must_use]
     pub fn best_explanation(&self) -> &Hypothesis {
         &self.hypotheses[self.best]
     }
 
-    /// Probability that some effects are all among the true ones: of all sets that hold them.
+    /// Returns the probability that some effects are all among the true ones: the sum over all sets
+    /// that contain them.
     #[must_use]
     pub fn marginal(&self, labels: &[String]) -> f64 {
         let holds = |h: &&Hypothesis| labels.iter().all(|l| h.labels.contains(l));

@@ -1,12 +1,13 @@
-//! Diagnosis of the sim-to-real gap: where it lies, which unmodelled effect causes it, and
-//! how far it shrinks once that effect is added.
+//! Diagnosis of the sim-to-real gap: where it lies, which unmodelled effect causes it, and how far
+//! it shrinks once that effect is added.
 //!
-//! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
-//! - [`intake`] looks at its logs before any physics: outliers, and [`wiring`].
-//! - [`latent_force`] asks which force is missing at each moment, or where bodies touch what short replays leave, and which effects
-//!   make up for it.
-//! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
-//!   is least squares over such replays.
+//! - [`study`] is the user's input: a model, logs of the real machine, and the parameters that are
+//!   already fitted.
+//! - [`intake`] examines the logs before any physics: outliers, and [`wiring`].
+//! - [`latent_force`] asks which force is missing at each moment, or what short replays leave where
+//!   bodies touch, and which effects make up for it.
+//! - [`predict`] replays the logs in a model for many parameter values at once; [`fit`] is least
+//!   squares over such replays.
 
 mod batch_columns;
 pub mod bench;

@@ -1,8 +1,8 @@
 //! Where the gap lies: by signal, by regime of motion, and under which readable condition.
 //!
-//! Open loop, an error that a force makes in one place is carried on for the rest of the
-//! episode. Shares are of the residual itself, which is what the user sees; conditions are
-//! looked for where the residual *grows*, which is where its cause acts.
+//! Open loop, an error that a force makes in one place persists for the rest of the episode. Shares
+//! are of the residual itself, which is what the user sees. Conditions are searched for where the
+//! residual *grows*, which is where its cause acts.
 
 mod condition;
 
@@ -15,15 +15,17 @@ use crate::result::Where;
 use crate::trajectory::{Path, Trajectory};
 use condition::{Features, growth};
 
-/// Share of an episode that counts as its beginning.
+/// Share of an episode that counts as its start.
 const BEGINNING: f64 = 0.03;
-/// Share of the largest speed below which a joint stands or turns round.
+/// Share of the largest speed below which a joint stands still or reverses.
 const SLOW: f64 = 0.03;
-/// Rows before and after one in which the speed of a joint that turns round has two signs.
+/// Number of rows before and after a reversal over which the speed has changed its sign.
 const AROUND: usize = 5;
 
-/// Shares of the excess squared residual in every cell of signal and regime that has some, largest first; they sum
-/// to 1. `residuals` are in units of the noise, without whitening, 0 where missing.
+/// Returns the share of the excess squared residual in each cell of signal and regime that has
+/// some, largest first; they sum to 1.
+///
+/// `residuals` are in units of the noise, without whitening, 0 where missing.
 #[must_use]
 pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64]) -> Vec<Where> {
     let n = logs.entries.len();
@@ -65,7 +67,7 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
         .collect()
 }
 
-/// What the part of the machine that a sensor reads is doing in a row.
+/// Returns the regime, in a row, of the part of the machine that a sensor reads.
 fn regime(
     plant: &Plant,
     shown: &Trajectory,
@@ -132,7 +134,7 @@ fn body_regime(plant: &Plant, shown: &Trajectory, path: &Path, body: usize, row:
         return "free".into();
     };
     let other = if pair[0] == body { pair[1] } else { pair[0] };
-    // With several contacts, that with the thing that moves is the one of interest.
+    // Of several contacts, the one with a moving body is of interest.
     let mover = shown
         .pairs
         .iter()

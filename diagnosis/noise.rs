@@ -1,17 +1,20 @@
 //! The noise floor of each sensor, estimated from the record itself.
 //!
-//! What a model leaves is smooth where the model is wrong and rough where the sensor is
-//! noisy: third differences of residuals remove the first and keep the second.
-//! For white noise of deviation s they have the deviation s sqrt(20). The median of their
-//! magnitudes is blind to the few moments (impacts) at which the residual is not smooth.
+//! Residuals are smooth where the model is wrong and rough where the sensor is noisy. Third
+//! differences of residuals remove the former and keep the latter. For white noise of standard
+//! deviation s they have the standard deviation s sqrt(20). The median of their magnitudes ignores
+//! the few moments (impacts) at which the residual is not smooth.
 //!
-//! Two things make them small although the noise is not. A reading that only repeats the one before (an encoder at rest, a sensor
-//! that is logged faster than it reads) has none of its own: such rows are passed over. And noise that was filtered
-//! differs little from row to row: third differences over more rows show it ([`Noise::correlation`]).
+//! Two things make the differences small although the noise is not. A reading that only repeats the
+//! one before (an encoder at rest, a sensor logged faster than it reads) has no noise of its own:
+//! such rows are skipped. Filtered noise differs little from row to row: third differences over
+//! more rows show it ([`Noise::correlation`]).
 //!
-//! Replays are measured in units of it ([`crate::prepare`] takes it from readings or residuals, [`crate::diagnose`] once more from what the
-//! best explanation leaves, [`crate::checks`] asks whether it is white). For the missing force it is where the variances of the readings begin, and
-//! what bounds them (`latent_force/estimate/variances.rs`). A study's own `noise` overrides it.
+//! Gaps of replays are in units of this noise. [`crate::prepare`] takes it from readings or
+//! residuals, [`crate::diagnose`] once more from the residuals of the best explanation, and
+//! [`crate::checks`] checks whether it is white. For the missing force it is the initial value and
+//! the bound of the readings' variances (`latent_force/estimate/variances.rs`). A study's own
+//! `noise` overrides it.
 
 mod quantization;
 
@@ -22,17 +25,18 @@ use crate::data::Logs;
 pub use asid_readings::noise::{NORMAL, Noise, median};
 pub use quantization::{noise_before, step};
 
-/// Estimates the deviation of each sensor's noise; see [`describe`].
+/// Estimates the standard deviation of each sensor's noise; see [`describe`].
 #[must_use]
 pub fn estimate(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<f64> {
     let all = describe(logs, residuals).into_iter();
     all.map(|n| n.deviation).collect()
 }
 
-/// Estimates the noise of each sensor from residuals `logged - predicted` in the sensors'
-/// units (`rows x entries`, NaN where missing), one array an episode. A sensor whose
-/// readings come in steps has at least the deviation of a step, step / sqrt(12); one whose steps are coarse that which it had before
-/// the rounding, beside which that is an effect.
+/// Estimates the noise of each sensor from residuals `logged - predicted`, one array per episode.
+///
+/// Residuals are in the sensors' units (`rows x entries`, NaN where missing). A sensor whose
+/// readings come in steps has at least the standard deviation of the rounding, step / sqrt(12). A
+/// sensor with coarse steps has the noise before the rounding, since coarse rounding is an effect.
 #[must_use]
 pub fn describe(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<Noise> {
     let n = logs.entries.len();
@@ -67,7 +71,7 @@ pub fn describe(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<Noise> {
         .collect()
 }
 
-/// Whether each row of an episode only repeats the reading of the row before.
+/// Returns whether each row of an episode only repeats the reading of the row before.
 fn repeats(logs: &Logs, episode: usize, sensor: usize, component: usize) -> Vec<bool> {
     let e = &logs.episodes[episode];
     let rows = e.plan.rows();
@@ -88,7 +92,7 @@ fn repeats(logs: &Logs, episode: usize, sensor: usize, component: usize) -> Vec<
     out
 }
 
-/// Readings of a sensor, component after component.
+/// Returns the readings of a sensor, component after component.
 pub(crate) fn readings(logs: &Logs, sensor: usize) -> Vec<Vec<f64>> {
     let width = logs.width();
     let mut at = 0;
@@ -117,7 +121,8 @@ pub(crate) fn readings(logs: &Logs, sensor: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// A deviation above 0 for a sensor without any noise: a millionth of its spread.
+/// Returns a positive standard deviation for a sensor without any noise: a millionth of its range
+/// of readings.
 fn smallest(logs: &Logs, sensor: usize) -> f64 {
     let spread = readings(logs, sensor)
         .iter()

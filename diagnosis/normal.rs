@@ -1,26 +1,29 @@
-//! Normal equations of a fit, in arrow form: the starts of an episode act on that episode alone, and
-//! are eliminated there (Schur's complement).
+//! Normal equations of a fit, in arrow form: the initial state of an episode acts on that episode
+//! alone, and is eliminated there (Schur complement).
 
 use nalgebra::linalg::SVD;
 use nalgebra::{DMatrix, DVector};
 
 use crate::linearise::Linearisation;
 
-/// Normal equations with the starts eliminated.
+/// Normal equations with the initial states eliminated.
 pub(crate) struct Normal {
-    /// `free x free`.
+    /// Information matrix, `free x free`.
     pub(crate) information: DMatrix<f64>,
-    /// `free`.
+    /// Gradient, `free`.
     pub(crate) gradient: DVector<f64>,
     /// For each episode: inverse of its block, its coupling, and its gradient.
     episodes: Vec<(DMatrix<f64>, DMatrix<f64>, DVector<f64>)>,
 }
 
-/// QR iterations of a singular value decomposition, at most, for each row: it takes two or three, and never ends where an entry is no number.
+/// Maximum number of QR iterations of a singular value decomposition per row: it needs two or
+/// three, and never ends if an entry is not finite.
 const ITERATIONS: usize = 100;
 
-/// Pseudo-inverse of a symmetric matrix, scaled to a unit diagonal first: directions whose
-/// share is below `tolerance` stay out. Zero where an entry is no number: it tells of nothing.
+/// Returns the pseudo-inverse of a symmetric matrix, scaled to a unit diagonal first.
+///
+/// Directions whose share is below `tolerance` are left out. It is zero if an entry is not finite:
+/// such a matrix carries no information.
 #[must_use]
 pub(crate) fn inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
     let n = matrix.nrows();
@@ -45,8 +48,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Normal {
-    /// Of the rows before a replay diverges: after it residuals are infinite, and columns 0. Each coordinate of a start has a normal prior about
-    /// where it is, as wide as its `reach`; none where that is empty.
+    /// Builds the equations from the rows before a replay diverges: after that residuals are
+    /// infinite, and columns 0.
+    ///
+    /// Each coordinate of an initial state has a normal prior about its present value, with its
+    /// `reach` as standard deviation; none if `reach` is empty.
     pub(crate) fn new(
         line: &Linearisation,
         bounds: &[std::ops::Range<usize>],
@@ -94,8 +100,10 @@ impl Normal {
         }
     }
 
-    /// What a unit of each residual moves the gradient by, with the starts refitted: the columns with their part along the starts taken
-    /// out, `free x residuals`.
+    /// Returns the change of the gradient per unit of each residual with the initial states
+    /// refitted, `free x residuals`.
+    ///
+    /// These are the columns less their components along those of the initial states.
     pub(crate) fn projected(
         &self,
         line: &Linearisation,
@@ -116,10 +124,10 @@ impl Normal {
         out
     }
 
-    /// Step of the free parameters; those in `held` do not move.
+    /// Returns the step of the free parameters; those in `held` do not move.
     pub(crate) fn step(&self, damping: f64, held: &[bool]) -> DVector<f64> {
         let p = self.gradient.len();
-        // Starts alone.
+        // There are initial states alone.
         if p == 0 {
             return DVector::zeros(0);
         }
@@ -139,7 +147,7 @@ impl Normal {
         a.lu().solve(&g).unwrap_or_else(|| DVector::zeros(p))
     }
 
-    /// Steps of an episode's start, given that of the parameters.
+    /// Returns the step of an episode's initial state, given that of the parameters.
     pub(crate) fn start_step(&self, episode: usize, step: &DVector<f64>) -> DVector<f64> {
         let (inverse, coupling, g) = &self.episodes[episode];
         inverse * (g - coupling.transpose() * step)
@@ -150,7 +158,8 @@ impl Normal {
 mod tests {
     use super::*;
 
-    /// A window of a hopper whose replay had failed: the decomposition never ended, and no answer came.
+    /// Symptom, for a window of a hopper whose replay had failed: the decomposition never ended,
+    /// and no answer came.
     #[test]
     fn the_inverse_of_what_is_no_number_is_zero_and_comes() {
         let matrix = DMatrix::from_row_slice(2, 2, &[2.0, f64::NAN, f64::NAN, 3.0]);
@@ -162,7 +171,8 @@ mod tests {
         assert!((inverse(&matrix, 1e-12) - expected).amax() < 1e-15);
     }
 
-    /// The spin of a ball about the normal of its floor: a step of ten thousand rad/s, after which nothing was left of the log.
+    /// Symptom, for the spin of a ball about the normal of its floor: a step of ten thousand rad/s,
+    /// which left nothing of the log.
     #[test]
     fn a_coordinate_that_hardly_shows_steps_no_further_than_it_reaches() {
         let line = Linearisation {
@@ -176,11 +186,12 @@ mod tests {
             normal.start_step(0, &none)[1]
         };
         assert!(step(&[]) > 1e3);
-        // A slope of 1e-3 a unit, and residuals of 3: 2 * 3e-3 over 2e-6 + 1 / 20^2.
+        // A derivative of 1e-3 per unit, and residuals of 3: 2 * 3e-3 over 2e-6 + 1 / 20^2.
         assert!((step(&[1.0, 20.0]) - 6e-3 / (2e-6 + 2.5e-3)).abs() < 1e-6);
     }
 
-    /// A fish whose smoothed start made the replay diverge: the step was not a number, and the engine refused it.
+    /// Symptom, for a fish whose smoothed initial state made the replay diverge: the step was NaN,
+    /// and the engine refused it.
     #[test]
     fn a_replay_that_diverges_steps_by_the_rows_before_it() {
         let line = Linearisation {

@@ -1,35 +1,47 @@
-//! Readings that are far off what comes before and after them: dropped bits, lost packets, a tracker's wrong match.
+//! Outliers: readings far from those before and after them, such as dropped bits, lost packets, a
+//! tracker's wrong match.
 //!
-//! Such a reading is no noise and no physics, and one of them weighs more in a sum of squares than hundreds of good ones. It is
-//! left out as if it were missing. Motion is not touched. A kink or a step lies on the line of the readings on one of its
-//! sides; an outlier lies on neither, far away on the same side of both. A strong acceleration bends several readings the same
-//! way; an outlier bends its neighbours the other way, half as much as itself.
+//! Such a reading is neither noise nor physics, and one of them weighs more in a sum of squares
+//! than hundreds of good ones. It is left out as if it were missing. Motion is not touched:
+//!
+//! - A kink or a step lies on the line of the readings on one of its sides. An outlier lies on
+//!   neither line, and far away on the same side of both.
+//! - A strong acceleration bends several readings in the same direction. An outlier bends its
+//!   neighbours in the opposite direction, half as much as itself.
 
 use asid_core::{Episode, Layout};
 
-/// Distance from both lines, in their typical distance, from which on a reading is an outlier. That of a line through two
-/// neighbours is 2.4 deviations of white noise: beyond 4.5 of those on both sides lies one reading of 1e9 (the two share its
-/// noise, and are otherwise independent), and heavier tails than the normal law's leave room.
+/// Distance from both lines, relative to the typical distance, from which on a reading is an
+/// outlier.
+///
+/// The distance from a line through two neighbours has 2.4 times the standard deviation of white
+/// noise. One reading in 1e9 lies beyond 4.5 of those on both sides (the two distances share the
+/// reading's noise and are otherwise independent). This leaves room for tails heavier than those of
+/// the normal distribution.
 const FAR: f64 = 4.5;
-/// Share of a column beyond which far readings are how it reads, and stay.
+/// Share of a column beyond which far readings are normal for the sensor, and stay.
 const MOST: f64 = 0.03;
-/// Ratio of a normal variable's deviation to the median of its magnitude.
+/// Ratio of a normal variable's standard deviation to the median of its magnitude.
 const NORMAL: f64 = crate::noise::NORMAL;
 
 /// Readings that were left out of a sensor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOut {
-    /// Sensor.
+    /// Name of the sensor.
     pub sensor: String,
     /// Number of readings over all logs.
     pub count: usize,
 }
 
-/// Share of its own bend by which an outlier bends its neighbours at least, the other way. Without noise it is a half.
+/// Least bend of an outlier's neighbours, in the opposite direction, as a share of its own; without
+/// noise it is a half.
 const BENDS: f64 = 0.25;
 
-/// A reading's distances from the lines through the two before it and the two after it, each in units of what a reading's
-/// noise makes of it, and whether it bends its neighbours as an outlier does.
+/// A reading's distances from the lines through the two before it and the two after it, and whether
+/// it is `alone`.
+///
+/// The distances are in units of the standard deviation that the noise of a reading gives them.
+/// `alone` says whether the reading bends its neighbours as an outlier does.
 struct Distances {
     row: usize,
     before: f64,
@@ -37,14 +49,15 @@ struct Distances {
     alone: bool,
 }
 
-/// Distance of a reading from the line through two others, by the root of the sum of the squares of its weights.
+/// Returns the distance of a reading from the line through two others, divided by the root of the
+/// sum of its squared weights.
 fn from_line([t, x]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let along = (t - a[0]) / (b[0] - a[0]);
     let weights = 1.0 + along * along + (1.0 - along).powi(2);
     (x - a[1] - along * (b[1] - a[1])) / weights.sqrt()
 }
 
-/// Distances of the readings of a column that have two neighbours on each side.
+/// Returns the distances of those readings of a column that have two neighbours on each side.
 fn distances(time: &[f64], column: impl Iterator<Item = f64>) -> Vec<Distances> {
     let present: Vec<(usize, [f64; 2])> = column
         .enumerate()
@@ -69,7 +82,7 @@ fn distances(time: &[f64], column: impl Iterator<Item = f64>) -> Vec<Distances> 
         .collect()
 }
 
-/// Leaves outliers out of some logs, which share sensors; with how many there were.
+/// Sets outliers to NaN in some logs with common sensors; returns how many there were.
 pub fn leave_out(logs: &mut [&mut Episode], layout: &Layout) -> Vec<LeftOut> {
     let mut found = Vec::new();
     for sensor in &layout.sensors {
@@ -96,7 +109,7 @@ pub fn leave_out(logs: &mut [&mut Episode], layout: &Layout) -> Vec<LeftOut> {
             let all = each.iter().flatten();
             let mut sizes: Vec<f64> = all.flat_map(|d| [d.before.abs(), d.after.abs()]).collect();
             readings += sizes.len() / 2;
-            // Where most readings do not move at all, any that does would be far.
+            // Where most readings do not move at all, any motion would be far.
             sizes.retain(|x| *x > 0.0);
             let Some(typical) = crate::noise::median(&mut sizes) else {
                 continue;
@@ -161,7 +174,7 @@ mod tests {
         }
     }
 
-    /// Noise of deviation 1 without a pattern that a line would follow.
+    /// Noise of standard deviation 1 without a pattern that a line would follow.
     fn noise(k: usize) -> f64 {
         let hash = (k as u64)
             .wrapping_mul(0x9E37_79B9_7F4A_7C15)

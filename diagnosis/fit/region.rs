@@ -1,24 +1,26 @@
-//! The values that a fit with a hidden missing force holds possible.
+//! The values that a fit with a hidden missing force considers possible.
 //!
-//! A whole replay adds up what the model lacks: an axis that drifts by a force that nobody named is replayed best by a wrong mass. The
-//! fit that allows for a missing force knows how far each value may lie off, and a fit to replays chooses among those values.
+//! A whole replay accumulates what the model lacks: if an unnamed force makes an axis drift, a
+//! wrong mass replays it best. The fit that allows for a missing force has the uncertainty of each
+//! value. A fit to replays chooses among the values within it.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// The 99 % quantile of the standard normal distribution: a value outside is contradicted at the rate of false alarms that a diagnosis
-/// is allowed by default.
+/// The 99 % quantile of the standard normal distribution: the default rate of false alarms rejects
+/// values outside.
 const QUANTILE: f64 = 2.326_348;
 
-/// An ellipsoid that holds 99 % of a normal distribution of some unknowns.
+/// An ellipsoid that contains 99 % of a normal distribution of some unknowns.
 #[derive(Clone, Debug)]
 pub struct Region {
-    /// Places of the unknowns.
+    /// Indices of the unknowns.
     places: Vec<usize>,
     mean: DVector<f64>,
     covariance: Cholesky<f64, Dyn>,
 }
 
-/// The 99 % quantile of the chi-square distribution of `n` degrees of freedom (Wilson and Hilferty 1931).
+/// Returns the 99 % quantile of the chi-square distribution with `n` degrees of freedom (Wilson and
+/// Hilferty 1931).
 fn chi_square(n: usize) -> f64 {
     let n = n as f64;
     let spread = 2.0 / (9.0 * n);
@@ -26,7 +28,10 @@ fn chi_square(n: usize) -> f64 {
 }
 
 impl Region {
-    /// Of the unknowns at some `places` with a mean and a covariance, in their units; `None` where the covariance has no full rank.
+    /// Makes the region of the unknowns at some `places` from their mean and covariance, in their
+    /// units.
+    ///
+    /// Returns `None` if the covariance is not of full rank.
     #[must_use]
     pub fn new(places: Vec<usize>, mean: Vec<f64>, covariance: DMatrix<f64>) -> Option<Self> {
         Some(Self {
@@ -36,7 +41,7 @@ impl Region {
         })
     }
 
-    /// Moves values that lie outside straight towards the mean, to the edge.
+    /// Moves values outside the region straight towards the mean, to its boundary.
     pub fn pull_in(&self, theta: &mut [f64]) {
         let own = self.places.iter().map(|&i| theta[i]);
         let off = DVector::from_iterator(self.places.len(), own) - &self.mean;
@@ -70,7 +75,8 @@ mod tests {
         let mut theta = inside;
         region.pull_in(&mut theta);
         assert_eq!(theta, inside);
-        // Ten deviations of the first: it comes as near as the quantile, and what is of no region stays.
+        // Ten standard deviations of the first: it moves to the quantile, and the value outside the
+        // region's unknowns stays.
         let mut theta = [-1.0, 7.0, 21.0];
         region.pull_in(&mut theta);
         assert!((theta[2] - (1.0 + 2.0 * chi_square(2).sqrt())).abs() < 1e-12);

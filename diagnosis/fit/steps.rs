@@ -12,10 +12,11 @@ use crate::predict::{Point, Predictor};
 use super::cost;
 use super::region::Region;
 
-/// Most times that columns are taken anew until their differences are right.
+/// Maximum number of times that columns are computed again until the steps of their differences are
+/// right.
 const SETTLING: usize = 4;
 
-/// What the steps of a fit work on.
+/// Everything that the steps of a fit need.
 pub(super) struct Steps<'w, 'r> {
     pub(super) predictor: &'w mut Predictor<'r>,
     pub(super) layout: &'w Layout,
@@ -29,7 +30,8 @@ pub(super) struct Steps<'w, 'r> {
 }
 
 impl Steps<'_, '_> {
-    /// Linearises at a point; the derivatives in the starts are those of a linearisation `nearby`, where there is one.
+    /// Linearises at a point; derivatives with respect to the initial states are taken from
+    /// `nearby`, if given.
     pub(super) fn line(
         &mut self,
         point: &Point,
@@ -52,7 +54,8 @@ impl Steps<'_, '_> {
         )
     }
 
-    /// The first linearisation: columns whose differences were far from what their responses ask for are taken anew.
+    /// Makes the first linearisation; columns whose steps were far from what their responses ask
+    /// for are computed again.
     pub(super) fn first(
         &mut self,
         point: &Point,
@@ -73,7 +76,7 @@ impl Steps<'_, '_> {
         Ok(line)
     }
 
-    /// The point after the best of some damped steps, with its cost, where it is below `best`.
+    /// Returns the best point of some damped steps with its cost, if that is below `best`.
     pub(super) fn stepped(
         &mut self,
         (line, point): (&Linearisation, &Point),
@@ -98,7 +101,7 @@ impl Steps<'_, '_> {
         Ok(None)
     }
 
-    /// The point after a damped step, within the bounds and the region.
+    /// Returns the point after a damped step, within the bounds and the region.
     fn trial(&self, (line, point): (&Linearisation, &Point), damping: f64) -> Point {
         let normal = Normal::new(line, &self.bounds, damping, self.reach);
         let parameter = |i: usize| &self.unknowns[i].parameter;
@@ -114,7 +117,7 @@ impl Steps<'_, '_> {
             .map(|c| (cost(c) / readings).sqrt() < NOTHING)
             .collect();
         let mut step = normal.step(damping, &held);
-        // Where the step leaves a bound that it starts from, that parameter stays.
+        // A parameter at a bound that the step would leave is held.
         for _ in 0..self.free.len() {
             let mut again = false;
             for k in 0..self.free.len() {

@@ -1,4 +1,4 @@
-//! Windows of the logs to first order: in a constant force at each joint, and in where they start.
+//! Windows of the logs, linearised in a constant force at each joint and in the initial states.
 
 use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
@@ -14,29 +14,31 @@ use crate::windows::settle;
 /// Name of the effect's parameter that is the force.
 const FORCE: &str = "offset";
 
-/// Windows linearised in the constant force of each joint and in their starts.
+/// Windows linearised in the constant force of each joint and in their initial states.
 pub(super) struct Linear {
-    /// The parameters, with the starts of the windows.
+    /// The parameters, with the initial states of the windows.
     pub(super) point: Point,
     /// For each joint, the range of its force in its unit.
     ranges: Vec<[f64; 2]>,
-    /// The residuals.
+    /// Residuals at that point.
     residuals: Vec<f64>,
-    /// Their derivatives: in each joint's force by shares of its range, then in the open coordinates of the starts.
+    /// Derivatives of the residuals: by each joint's force per share of its range, then by the open
+    /// coordinates of the initial states.
     columns: Vec<Vec<f64>>,
-    /// Which residuals have a reading behind them.
+    /// Which residuals have a reading.
     present: Vec<bool>,
 }
 
 impl Linear {
-    /// Of a model with some effects, at windows whose starts are fitted; `forces` are the constant forces of the joints.
+    /// Linearises a model with some effects at windows with fitted initial states; `forces` are the
+    /// constant forces of the joints.
     pub(super) fn of(
         bench: &Bench,
         windows: &Record,
         (trials, theta): (&[Trial<'_>], &[f64]),
         forces: &[Candidate],
     ) -> Result<Self> {
-        // A joint that has the effect already has its force among the parameters.
+        // If a joint has the effect already, its force is among the parameters.
         let mut all: Vec<Trial<'_>> = trials.to_vec();
         for force in forces {
             if !trials.iter().any(|(c, _)| c.label() == force.label()) {
@@ -69,16 +71,16 @@ impl Linear {
                 &mut differences,
             )
         };
-        // Twice for the size of the differences.
+        // Two linearisations adapt the steps of the differences.
         line()?;
         line()?;
         let line = line()?;
-        // Columns come in the order of the parameters; forces in that of the joints.
+        // Columns are in the order of the parameters, forces in that of the joints.
         let mut order = places.clone();
         order.sort_unstable();
         let column = |i: &usize| order.iter().position(|o| o == i).unwrap_or(0);
         let own = places.iter().map(|i| line.columns[column(i)].clone());
-        // Rows from which on a replay has failed tell of no force.
+        // Rows after a replay has failed carry no information on forces.
         let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
         let mut columns: Vec<Vec<f64>> = own.chain(line.start_columns).collect();
         columns.iter_mut().flatten().for_each(|x| *x = finite(*x));
@@ -94,14 +96,15 @@ impl Linear {
         })
     }
 
-    /// Root mean square residual of some rows.
+    /// Returns the root mean square residual of some rows.
     pub(super) fn gap(&self, rows: std::ops::Range<usize>) -> f64 {
         let readings = rows.filter(|&k| self.present[k]);
         let squares: Vec<f64> = readings.map(|k| self.residuals[k].powi(2)).collect();
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
-    /// The force at each joint that explains most of the rows of a window, with its variance, in the joint's unit.
+    /// Returns the force at each joint that explains most of the rows of a window, with its
+    /// variance, in the joint's unit and its square.
     pub(super) fn forces(&self, rows: std::ops::Range<usize>) -> Vec<(f64, f64)> {
         let n = self.columns.len();
         let part = |i: usize| &self.columns[i][rows.clone()];

@@ -1,18 +1,22 @@
-//! Under which condition a residual grows: a threshold on a reading, a command or the time.
+//! The condition under which a residual grows: a threshold on a reading, a command or the time.
 
 use crate::data::Logs;
 
-/// Rows over which the growth of a residual is taken.
+/// Number of rows over which the growth of a residual is taken.
 const WINDOW: usize = 5;
 /// Largest share of the rows for which a condition may hold.
 const FEW: f64 = 0.6;
-/// Smallest share of the rows for which a condition may hold: of fewer a threshold is chance.
+/// Smallest share of the rows for which a condition may hold: with fewer rows a threshold is
+/// chance.
 const FEWEST: f64 = 0.02;
-/// Smallest share of the growth that a condition must hold for.
+/// Smallest share of the growth that must fall within a condition.
 const MOST: f64 = 0.8;
 
-/// Squared growth of an entry's residual over the [`WINDOW`] rows that end at each row, above what noise alone gives;
-/// not a number where a reading is missing. One value a row from [`WINDOW`] on, episode by episode.
+/// Returns the squared growth of an entry's residual over the [`WINDOW`] rows that end at each row,
+/// beyond that of noise alone.
+///
+/// It is NaN where a reading is missing. There is one value per row from [`WINDOW`] on, episode by
+/// episode.
 pub(super) fn growth(logs: &Logs, residuals: &[f64], entry: usize) -> Vec<f64> {
     let n = logs.entries.len();
     let mut growth = Vec::new();
@@ -31,20 +35,22 @@ pub(super) fn growth(logs: &Logs, residuals: &[f64], entry: usize) -> Vec<f64> {
     growth
 }
 
-/// What a condition may be about: readings of plain sensors, commands, and the time since the start of an episode,
-/// each in the middle of the rows of a [`growth`].
+/// Quantities of a condition: readings of plain sensors, commands, and the time since the start of
+/// an episode.
+///
+/// Each is taken in the middle of the rows of a [`growth`].
 pub(super) struct Features {
     names: Vec<String>,
-    /// One list a name, one value a growth.
+    /// One list per name, with one value per growth.
     values: Vec<Vec<f64>>,
-    /// Places of the finite values, smallest first.
+    /// Indices of the finite values, smallest value first.
     order: Vec<Vec<usize>>,
 }
 
 impl Features {
     pub(super) fn of(logs: &Logs) -> Self {
         let mut names: Vec<String> = Vec::new();
-        // Where the readings of plain sensors stand in a row.
+        // Columns of the readings of plain sensors in a row.
         let mut columns = Vec::new();
         let mut column = 0;
         for (i, sensor) in logs.sensors.iter().enumerate() {
@@ -83,8 +89,9 @@ impl Features {
         }
     }
 
-    /// The threshold beyond which [`MOST`] of the growth lies in the fewest rows; none where there is none, or where
-    /// the residual grows by no more than noise.
+    /// Returns the threshold beyond which [`MOST`] of the growth lies in the fewest rows.
+    ///
+    /// Returns `None` if there is none, or if the residual grows by no more than noise.
     pub(super) fn condition(&self, growth: &[f64]) -> Option<String> {
         let known = growth.iter().filter(|g| g.is_finite());
         let total: f64 = known.clone().sum();

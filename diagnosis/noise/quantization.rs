@@ -1,14 +1,16 @@
-//! Quantization: the step of a sensor whose readings are multiples of one, and what noise there was before the rounding.
+//! Quantization: the step of a sensor whose readings are multiples of one, and the noise before the
+//! rounding.
 
 use std::f64::consts::PI;
 
 use super::{median, readings};
 use crate::data::Logs;
 
-/// Rounding of the readings in a log, relative to their step, up to which they still count as steps.
+/// Largest rounding error of the log's numbers, relative to the step, for which readings still
+/// count as steps.
 const ROUNDING: f64 = 0.05;
 
-/// Step of a sensor whose readings are multiples of one; 0 where they are not.
+/// Returns the step of a sensor whose readings are multiples of one; 0 if they are not.
 #[must_use]
 pub fn step(logs: &Logs, sensor: usize) -> f64 {
     let mut steps: Vec<f64> = readings(logs, sensor)
@@ -18,16 +20,21 @@ pub fn step(logs: &Logs, sensor: usize) -> f64 {
     median(&mut steps).unwrap_or(0.0)
 }
 
-/// Steps that a motion spans, at least and at most, where they are coarse: fewer are a sensor at rest, and more than 16, four bits, an encoder that
-/// resolves the motion, whose rounding is its noise.
+/// Fewest and most steps that a motion spans if they are coarse.
+///
+/// A sensor at rest spans fewer. An encoder that spans more than 16, four bits, resolves the
+/// motion, and its rounding is its noise.
 const COARSE: [f64; 2] = [4.0, 16.0];
 
-/// Deviation of the noise before the rounding, for a sensor that resolves its motion into no more than 16 steps; `None` for any other.
+/// Returns the standard deviation of the noise before the rounding, for a sensor whose motion spans
+/// 4 to 16 steps; `None` for any other.
 ///
-/// While a motion of `v` a row passes the edge of a step, noise of deviation `s` takes the reading back and forth. It changes with
-/// probability `2 p (1 - p)` from row to row, with `p` the normal distribution function of the distance from the edge over `s`: `2 s / (v sqrt(pi))`
-/// times an edge where that is more than once. There are `v / step` edges a row, so that of the share of rows at which the reading changes
-/// `s = share step sqrt(pi) / 2` follows. Less noise changes a reading no less than once an edge: this is the most that there can have been.
+/// While a motion of `v` per row passes the edge of a step, noise of standard deviation `s` moves
+/// the reading back and forth. The reading changes from row to row with probability `2 p (1 - p)`,
+/// where `p` is the normal distribution function of the distance from the edge over `s`. That is `2
+/// s / (v sqrt(pi))` changes per edge, if it is more than one. There are `v / step` edges per row.
+/// The share of rows at which the reading changes therefore gives `s = share step sqrt(pi) / 2`.
+/// With less noise a reading still changes once per edge, so this is an upper bound.
 #[must_use]
 pub fn noise_before(logs: &Logs, sensor: usize) -> Option<f64> {
     let step = step(logs, sensor);
@@ -48,13 +55,16 @@ pub fn noise_before(logs: &Logs, sensor: usize) -> Option<f64> {
     Some(changes as f64 / rows as f64 * step * PI.sqrt() / 2.0)
 }
 
-/// Step that some values are multiples of, but for one common shift and rounding. Multiples are counted from
-/// neighbour to neighbour, so that a rounded step does not add up.
+/// Returns the step of which some values are multiples, up to a common shift and rounding.
+///
+/// Multiples are counted from neighbour to neighbour, so that the rounding of the step does not
+/// accumulate.
 fn step_of(mut values: Vec<f64>) -> Option<f64> {
     let count = values.len();
     values.sort_by(f64::total_cmp);
     values.dedup();
-    // Few distinct values for many readings, all on one grid. Two are one: of a joint that hardly leaves a step of its encoder.
+    // There are few distinct values for many readings, all on one grid. Two values are one step, of
+    // a joint that hardly leaves a step of its encoder.
     if values.len() < 2 || 2 * values.len() >= count {
         return None;
     }
@@ -87,8 +97,8 @@ mod tests {
 
     #[test]
     fn a_step_is_found_though_the_log_rounds_its_readings() {
-        // An encoder of 4096 steps a turn, written with six digits, over 500 steps: multiples of the rounded step would
-        // be off by a third of one at the end.
+        // An encoder of 4096 steps per turn, written with six digits, over 500 steps: multiples of
+        // the rounded step would be off by a third of a step at the end.
         let step = std::f64::consts::TAU / 4096.0;
         let reading = |k: u32| (1e6 * (0.31 + step * f64::from(k))).round() / 1e6;
         let values: Vec<f64> = (0..4000).map(|i| reading((i * 7) % 501)).collect();
@@ -97,7 +107,7 @@ mod tests {
 
     #[test]
     fn the_noise_before_a_coarse_rounding_is_told_by_how_often_readings_change() {
-        // A slide that goes from 0 to 8 steps of 1 m in 8000 rows, with noise of 0.05 m.
+        // A slide that moves from 0 to 8 steps of 1 m in 8000 rows, with noise of 0.05 m.
         let mut rng = asid_core::Streams::new(1).stream("readings");
         let noise = rand_distr::Normal::new(0.0, 0.05).unwrap();
         let places: Vec<f64> = (0..8000)
@@ -112,7 +122,7 @@ mod tests {
         };
         let found = of(&places).expect("eight steps are coarse");
         assert!((found / 0.05 - 1.0).abs() < 0.2, "{found}");
-        // Without noise it is no more than how far the slide goes in a row.
+        // Without noise the estimate is at most what the slide moves per row.
         let clean: Vec<f64> = (0..8000).map(|k| (0.001 * f64::from(k)).round()).collect();
         assert!(of(&clean).expect("they are coarse") < 0.001);
         let fine: Vec<f64> = (0..8000).map(|k| (0.01 * f64::from(k)).round()).collect();
