@@ -1,9 +1,11 @@
-//! Wiring before physics: columns that are swapped, count the other way, are in another unit, have another zero, or another clock.
+//! Wiring faults: columns that are swapped, have the wrong sign, another unit, another zero, or
+//! another clock.
 //!
-//! They are the first thing that users of such tools meet, and no effect: a diagnosis that took them for physics would explain
-//! anything. So they are looked for before any fit, by short predictions of the model as given ([`windows`]) under each view
-//! of the columns ([`hypotheses`]); what makes sense of a log that was nonsense is proposed ([`evidence`]), as lines for
-//! the study file, and the diagnosis goes on with it.
+//! They are the first problem that users of such tools meet, and are no effects: a diagnosis that
+//! took them for physics would explain anything. So the program looks for them before any fit. The
+//! model as given makes short predictions ([`windows`]) under each view of the columns
+//! ([`hypotheses`]). A view under which a nonsensical log makes sense is proposed ([`evidence`]),
+//! as lines for the study file, and the diagnosis continues with it.
 
 pub mod evidence;
 pub mod hypotheses;

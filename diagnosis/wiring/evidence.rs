@@ -1,47 +1,59 @@
 //! Evidence for a view of the columns against the one given.
 //!
-//! A wrong view is nonsense to the model: it predicts the other way, another joint, or a motion 57 times too large. An effect that
-//! the model lacks leaves a prediction that is a little off. Both shrink when something is fitted, so that significance
-//! against the noise says nothing here: what counts is by which factor misses shrink, in units of the motion that is to be
-//! predicted. The scale of that factor is set on the training half of `asid withheld`, whose worlds have every effect of the
-//! catalogue up to a hundred floors of the noise: over 76 of its cases whose wiring is right the best hypothesis shrinks misses by
-//! a factor with a logarithm of at most 0.5, and over some two hundred that were spoilt the right one by at least 0.8
-//! (`docs/logs.md` has the command).
+//! Under a wrong view the model predicts nonsense: the opposite motion, another joint, or a motion
+//! 57 times too large. An effect that the model lacks leaves a small error. Both shrink when
+//! something is fitted, so significance against the noise is no criterion. The criterion is the
+//! factor by which misses shrink, in units of the motion to be predicted. Its scale is set on the
+//! training half of `asid withheld`, whose worlds have every effect of the catalogue up to a
+//! hundred noise floors. In 76 of its cases with right wiring the best hypothesis shrinks misses by
+//! a factor whose logarithm is at most 0.5. In some two hundred cases with a fault, the right
+//! hypothesis has at least 0.8 (`docs/logs.md` has the command).
 
 use super::windows::Misses;
 
-/// When a fault of wiring is named.
+/// Thresholds from which on a wiring fault is named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Misses below this share of the motion are those of a right wiring, and shrinking them further is no evidence. Larger: fewer
-    /// faults are found, and fewer effects are taken for them.
+    /// Misses below this share of the motion are those of right wiring, and shrinking them further
+    /// is no evidence.
+    ///
+    /// Larger: fewer faults are found, and fewer effects are mistaken for faults.
     pub good: f64,
-    /// Share of the motion that a column misses from which on its zero and its clock are in question. Smaller: more is tried.
+    /// Share of the motion that a column must miss for its zero and its clock to be in question.
+    /// Smaller: more is tried.
     pub suspect: f64,
-    /// Share of the motion that a column misses from which on its sign, unit and name are in question: a wrong one misses
-    /// about twice the motion. Smaller: more is tried.
+    /// Share of the motion that a column must miss for its sign, unit and name to be in question.
+    ///
+    /// A wrong one misses about twice the motion. Smaller: more is tried.
     pub nonsense: f64,
-    /// Logarithm of the factor by which misses shrink, summed over columns, at which a fault is as likely as not.
+    /// Logarithm of the factor by which misses shrink, summed over columns, that gives a fault even
+    /// odds.
     pub even: f64,
-    /// The change of that logarithm that multiplies the odds by e.
+    /// Change of that logarithm that multiplies the odds by e.
     pub scale: f64,
-    /// Additional logarithm for a clock, which delays of drives and sensors resemble.
+    /// Additional logarithm that a clock needs, because delays of drives and sensors resemble it.
     pub clock: f64,
-    /// The same for readings that come before what they tell of: only stamps of commands that are late make them.
+    /// The same for readings earlier than the motion, which only late stamps of commands cause.
     pub early: f64,
-    /// Additional logarithm for commands, for units that hardly any log is in, and for two faults at once: they are rarer than the others.
+    /// Additional logarithm for commands, for units that hardly any log has, and for two faults at
+    /// once: these are rarer.
     pub rare: f64,
-    /// Logarithm of the factor by which late readings have to beat late commands to be a clock's: on a machine with one drive, whose
-    /// own delay is as likely, and on one with several, which are seldom late alike.
+    /// Logarithm of the factor by which late readings must beat late commands for a clock to be
+    /// named.
+    ///
+    /// The first is for a machine with one drive, whose own delay is as likely. The second is for
+    /// several drives, which are seldom late alike.
     pub drive: [f64; 2],
-    /// Smallest offset that is wiring, in deviations of the column: smaller ones are the effect `sensor-bias`.
+    /// Smallest offset of a wiring fault, in standard deviations of the column: smaller ones are
+    /// the effect `sensor-bias`.
     pub offset: f64,
-    /// Smallest delay that is a clock's, s: smaller ones are effects.
+    /// Smallest delay of a clock, s: smaller ones are effects.
     pub delay: f64,
     /// Probability from which on a fault is named.
     pub named: f64,
-    /// Probability below which whole replays, and what a diagnosis leaves, have the last word about a fault. Larger: more logs that are
-    /// wired as they should be are diagnosed both ways.
+    /// Probability below which whole replays, and what a diagnosis leaves, decide about a fault.
+    ///
+    /// Larger: more logs with right wiring are diagnosed both ways.
     pub certain: f64,
 }
 
@@ -66,8 +78,10 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Logarithm of the factor by which misses shrink from one view to another, summed over columns: in windows from states
-    /// read off the log, and from given starts.
+    /// Logarithm of the factor by which misses shrink from one view to another, summed over
+    /// columns.
+    ///
+    /// The sum covers windows from states read off the log and from given initial states.
     #[must_use]
     pub fn shrinkage(&self, from: &Misses, to: &Misses) -> f64 {
         self.logarithm(&from.miss, &to.miss) + self.logarithm(&from.start_miss, &to.start_miss)
@@ -81,7 +95,8 @@ impl Settings {
         pairs.map(ratio).sum()
     }
 
-    /// Probability of a fault that shrinks misses by a factor with this logarithm, beyond `more`.
+    /// Probability of a fault with this logarithm of the shrinkage, of which it needs `more` than
+    /// others.
     #[must_use]
     pub fn probability(&self, shrinkage: f64, more: f64) -> f64 {
         1.0 / (1.0 + (-(shrinkage - self.even - more) / self.scale).exp())

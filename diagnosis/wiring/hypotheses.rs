@@ -1,4 +1,4 @@
-//! What may be wrong with the wiring: the ways of reading the columns that are compared with the one given.
+//! Hypotheses about the wiring: other views of the columns that are compared with the given one.
 
 use asid_core::layout::JointKind;
 use asid_mjcf::Plant;
@@ -6,12 +6,13 @@ use asid_mjcf::plant::Reads;
 
 use super::view::{ColumnView, View};
 
-/// Latest readings that are looked for against commands, s: a control stack with buffers of the network. Later ones are
-/// found at this edge.
+/// Largest delay of readings relative to commands that is searched for, s.
+///
+/// It is that of a control stack with network buffers. Later readings are found at this edge.
 pub const LATEST: f64 = 0.2;
-/// Step of the delays that are tried, s.
+/// Step between the delays that are tried, s.
 const DELAY_STEP: f64 = 0.02;
-/// Earliest: stamps of commands may be late as well, s.
+/// Smallest delay, s: it is negative because the stamps of commands may be late as well.
 pub const EARLIEST: f64 = -0.06;
 
 /// A degree, rad.
@@ -22,7 +23,7 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 pub enum Fault {
     /// Two columns are swapped.
     Swapped,
-    /// A column counts the other way.
+    /// A column has the wrong sign.
     Sign,
     /// A column is in another unit.
     Unit,
@@ -45,8 +46,10 @@ impl Fault {
         }
     }
 
-    /// Whether effects can look like it: friction holds a drive back as a late clock does, and a load shifts it as another zero
-    /// does. Nothing looks like a sign, a unit or a swap.
+    /// Whether effects can look like this fault.
+    ///
+    /// Friction holds a drive back as a late clock does, and a load shifts it as another zero does.
+    /// Nothing looks like a wrong sign, a unit or a swap.
     #[must_use]
     pub fn is_imitable(self) -> bool {
         matches!(self, Self::Offset | Self::Clock)
@@ -62,35 +65,38 @@ pub struct Quantity {
     pub whole: String,
     /// Whether it is a command.
     pub command: bool,
-    /// Place in a row of readings or commands.
+    /// Index in a row of readings or commands.
     pub place: usize,
-    /// Joint that it reads or drives, where it is one's.
+    /// Joint that it reads or drives, if it belongs to one.
     pub joint: Option<usize>,
-    /// What it is, so that columns of the same kind can be swapped.
+    /// Kind of quantity: columns of the same kind can be swapped.
     pub kind: String,
-    /// Units that it may be recorded in, with the factor that brings each to the model's unit.
+    /// Units in which it may be recorded, each with its factor to the model's unit.
     pub units: Vec<(&'static str, f64)>,
 }
 
-/// A hypothesis: a view and what it says is wrong.
+/// A hypothesis: a view, and the fault that it stands for.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
     /// Kind of fault.
     pub fault: Fault,
     /// Indices of the quantities concerned.
     pub quantities: Vec<usize>,
-    /// Whether hardly any log is so.
+    /// Whether hardly any log has this fault.
     pub rare: bool,
-    /// Whether it is several faults at once, of which each alone makes no sense.
+    /// Whether it combines several faults, each of which alone makes no sense.
     pub compound: bool,
     /// How the columns are read.
     pub view: View,
 }
 
-/// Units that a quantity with some SI unit may be recorded in, the usual one first, with their factors; without a name where no unit has the factor.
+/// Units in which a quantity of an SI unit may be recorded, with their factors, the usual one
+/// first.
+///
+/// The name is empty if no unit has the factor.
 fn units(si: &str) -> Vec<(&'static str, f64)> {
     match si {
-        // A reading of radians may have been brought to radians a second time.
+        // Radians may have been converted from degrees a second time.
         "rad" => vec![
             ("deg", DEGREE),
             ("", 1.0 / DEGREE),
@@ -110,7 +116,7 @@ fn units(si: &str) -> Vec<(&'static str, f64)> {
     }
 }
 
-/// Quantities of a row of readings of some sensors, and of a row of commands.
+/// Returns the quantities of a row of readings of some sensors, and of a row of commands.
 #[must_use]
 pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
     let layout = &plant.layout;
@@ -136,7 +142,8 @@ pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
             } else {
                 format!("{name}.{i}")
             };
-            // Entries of one vector may be swapped among each other, those of two vectors seldom are.
+            // Entries of one vector may be swapped among themselves; entries of two vectors seldom
+            // are.
             let kind = if sensor.len == 1 {
                 format!("{} {si}", sensor.kind)
             } else {
@@ -182,7 +189,7 @@ pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
     all
 }
 
-/// View of a quantity within a view of all.
+/// Returns the view of one quantity within a view of all.
 #[must_use]
 pub fn view_of(view: &View, quantity: &Quantity) -> ColumnView {
     if quantity.command {
@@ -192,7 +199,7 @@ pub fn view_of(view: &View, quantity: &Quantity) -> ColumnView {
     }
 }
 
-/// The same view with another of one quantity.
+/// Returns the view with one quantity's view replaced.
 #[must_use]
 pub fn with(view: &View, quantity: &Quantity, of: ColumnView) -> View {
     let mut view = view.clone();
@@ -204,7 +211,7 @@ pub fn with(view: &View, quantity: &Quantity, of: ColumnView) -> View {
     view
 }
 
-/// Hypotheses about signs, units and names of columns of which one at least is among `suspects`.
+/// Hypotheses about signs, units and names of columns, at least one of them among `suspects`.
 #[must_use]
 pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypothesis> {
     let mut found = Vec::new();
@@ -221,7 +228,7 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                 });
             };
             one(Fault::Sign, own.times(-1.0));
-            // The entries of a vector are in one unit.
+            // All entries of a vector have the same unit.
             let vector: Vec<usize> = (0..all.len())
                 .filter(|&j| all[j].whole == a.whole)
                 .collect();
@@ -233,7 +240,7 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                 found.push(Hypothesis {
                     fault: Fault::Unit,
                     quantities: vector.clone(),
-                    // The usual one comes first.
+                    // The usual unit comes first.
                     rare: k > 0,
                     compound: false,
                     view: scaled,
@@ -243,7 +250,8 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
         for (j, b) in all.iter().enumerate().skip(i + 1) {
             if a.kind == b.kind && (suspects[i] || suspects[j]) {
                 found.push(swapped(view, [(i, a), (j, b)], [1.0, 1.0]));
-                // Of two encoders that are exchanged, one may be mounted the other way round: neither fault alone makes sense.
+                // One of two swapped encoders may be mounted the other way round: then neither
+                // fault alone makes sense.
                 if !a.command && suspects[i] && suspects[j] {
                     let signs = [[1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
                     found.extend(signs.map(|signs| swapped(view, [(i, a), (j, b)], signs)));
@@ -254,7 +262,7 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
     found
 }
 
-/// Two quantities read from each other's columns, each times a sign.
+/// Swaps the columns of two quantities, each times a sign.
 fn swapped(view: &View, [(i, a), (j, b)]: [(usize, &Quantity); 2], signs: [f64; 2]) -> Hypothesis {
     let (from_a, from_b) = (view_of(view, a), view_of(view, b));
     let first = with(view, a, from_b.times(signs[0]));
@@ -268,7 +276,7 @@ fn swapped(view: &View, [(i, a), (j, b)]: [(usize, &Quantity); 2], signs: [f64; 
     }
 }
 
-/// The view with all readings later by some time.
+/// Returns the view with all readings delayed by some time, s.
 #[must_use]
 pub fn delayed(view: &View, delay: f64) -> View {
     let mut view = view.clone();
@@ -276,7 +284,7 @@ pub fn delayed(view: &View, delay: f64) -> View {
     view
 }
 
-/// The view with all commands acting later by some time.
+/// Returns the view with all commands delayed by some time, s.
 #[must_use]
 pub fn commanded_later(view: &View, delay: f64) -> View {
     let mut view = view.clone();
@@ -284,7 +292,7 @@ pub fn commanded_later(view: &View, delay: f64) -> View {
     view
 }
 
-/// Delays of readings against commands that are tried, s.
+/// Delays of readings relative to commands that are tried, s.
 #[must_use]
 pub fn delays() -> Vec<f64> {
     let steps = |to: f64| (to / DELAY_STEP).round() as i32;

@@ -1,4 +1,4 @@
-//! A study with the wiring that its logs show, and the lines that say so.
+//! Corrects the wiring of a study as its logs show it, with the lines for the study file.
 
 use asid_core::parameter::Scale;
 use asid_core::{Layout, Parameter, Result, Target};
@@ -16,19 +16,20 @@ use super::search::{Found, Outcome, Search};
 use super::view::{View, mapping};
 use super::windows::{FEW, WINDOWS, Windows};
 
-/// A study after its wiring was looked at.
+/// A study after the check of its wiring.
 pub struct Mended {
     /// The study with the mappings applied to its logs.
     pub study: Study,
-    /// What was found.
+    /// The faults that were found.
     pub wiring: Vec<WiringResult>,
-    /// The mappings that mend it, of the columns as the study takes them.
+    /// The mappings that correct it, for the columns as the study reads them.
     pub mappings: Vec<ColumnMapping>,
-    /// Whether all of it may be nothing: each fault is one that effects can look like, or not certain.
+    /// Whether all faults are in doubt: each one resembles effects or is uncertain.
     pub doubted: bool,
-    /// By which factor, as a logarithm, each shrinks what predictions miss, summed over columns.
+    /// Logarithm of the factor by which each fault shrinks the misses of predictions, summed over
+    /// columns.
     pub shrinkage: Vec<f64>,
-    /// The fault nearest to being named.
+    /// The most likely fault that is not named.
     pub nearest: Option<Nearest>,
 }
 
@@ -39,7 +40,7 @@ pub struct Nearest {
     pub fault: &'static str,
     /// Columns.
     pub columns: Vec<String>,
-    /// As [`Mended::shrinkage`].
+    /// See [`Mended::shrinkage`].
     pub shrinkage: f64,
 }
 
@@ -59,7 +60,7 @@ fn logged(study: &Study, machine: &Machine) -> Vec<String> {
         .collect()
 }
 
-/// Looks at the wiring of a study's logs, and reads them by what it found.
+/// Checks the wiring of a study's logs, and reads them with what it found.
 ///
 /// # Errors
 /// When the engine fails.
@@ -140,8 +141,11 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     })
 }
 
-/// The damping of each joint that a position servo drives, as a parameter: from that of the model up to where the servo lags by as much as the
-/// latest of clocks. Those that are among the study's own `parameters` are left out, and those that the engine does not set.
+/// The damping of each joint that a position servo drives, as a parameter.
+///
+/// Its range begins at the model's damping and ends where the servo lags as much as the latest
+/// clock. Excluded are those among the study's own `parameters`, and those that the engine does not
+/// set.
 fn dampings(machine: &Machine, parameters: &[Parameter]) -> Result<Vec<Parameter>> {
     let layout = &machine.plant.layout;
     let model = machine.with(&[])?;
@@ -174,7 +178,7 @@ fn dampings(machine: &Machine, parameters: &[Parameter]) -> Result<Vec<Parameter
     Ok(found)
 }
 
-/// Reads the logs of a study by further mappings.
+/// Reads the logs of a study with further mappings.
 ///
 /// # Errors
 /// When a mapping does not fit the logs.
@@ -185,19 +189,19 @@ pub fn apply(study: &mut Study, layout: &Layout, mappings: &[ColumnMapping]) -> 
     Ok(())
 }
 
-/// The lines of the mappings that concern some columns, for the study's file.
+/// Returns the lines for the study file of the mappings that concern some columns.
 pub fn lines(study: &Study, mappings: &[ColumnMapping], columns: &[String]) -> String {
     let own = mappings.iter().filter(|m| concerns_any(m, columns));
     let lines: Vec<String> = own.map(|m| study.composed(m).lines()).collect();
     lines.join("\n")
 }
 
-/// Whether a mapping is of some of these columns.
+/// Whether a mapping concerns any of these columns.
 pub fn concerns_any(mapping: &ColumnMapping, columns: &[String]) -> bool {
     columns.iter().any(|c| concerns(mapping, c))
 }
 
-/// Whether a mapping is of a column, or of an entry of it, or of the vector that it is an entry of.
+/// Whether a mapping concerns a column, one of its entries, or the vector that it belongs to.
 fn concerns(mapping: &ColumnMapping, column: &str) -> bool {
     let entry = |of: &str, vector: &str| {
         of.strip_prefix(vector)
@@ -207,7 +211,8 @@ fn concerns(mapping: &ColumnMapping, column: &str) -> bool {
     mapping.name == column || entry(&mapping.name, column) || entry(column, &mapping.name)
 }
 
-/// Mappings of a view: one a quantity that it changes, or one a vector whose entries are all changed alike.
+/// Mappings of a view: one for each quantity that changes, or one for a vector whose entries change
+/// alike.
 fn mappings(all: &[Quantity], view: &View) -> Vec<ColumnMapping> {
     let names = |command: bool| -> Vec<String> {
         let own = all.iter().filter(|q| q.command == command);

@@ -1,4 +1,5 @@
-//! The logs as series: each column with its own times of reading, so that gaps and rates of its own do not matter.
+//! The logs as time series: each column has its own reading times, so that gaps and its own rate do
+//! not matter.
 
 use asid_core::episode::InitialState;
 use asid_core::layout::Layout;
@@ -10,10 +11,10 @@ use super::view::{ColumnView, View};
 /// Fewest readings of a local fit: one more than a parabola has coefficients.
 const FEWEST: usize = 4;
 
-/// Time within which a reading is that of a row, s: rounding.
+/// Time within which a reading belongs to a row, s: it covers rounding.
 const ON_ROW: f64 = 1e-9;
 
-/// One column of a log where it was read.
+/// The readings of one column of a log.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
     /// Times from the first row on, s.
@@ -23,7 +24,8 @@ pub struct Series {
 }
 
 impl Series {
-    /// The reading at a time, on a line between its neighbours; NaN where these are farther apart than `widest` (s).
+    /// Reading at a time, interpolated linearly; NaN if the neighbours are farther apart than
+    /// `widest` (s).
     #[must_use]
     pub fn at(&self, time: f64, widest: f64) -> f64 {
         let after = self.time.partition_point(|t| *t < time - ON_ROW);
@@ -41,7 +43,9 @@ impl Series {
         x + (time - a) / (b - a) * (y - x)
     }
 
-    /// Value and slope at a time, of the parabola through the readings within `half` (s) of it, or through the nearest few.
+    /// Value and derivative at a time, from a parabola.
+    ///
+    /// The parabola fits the readings within `half` (s) of the time, or the nearest few.
     #[must_use]
     pub fn local(&self, time: f64, half: f64) -> Option<(f64, f64)> {
         let mut first = self.time.partition_point(|t| *t < time - half);
@@ -70,7 +74,7 @@ impl Series {
         Some((fit[0], fit[1] / scale))
     }
 
-    /// Readings of some series as one, whose times mean nothing.
+    /// Joins the readings of several series into one without times.
     pub fn joined<'s>(all: impl Iterator<Item = &'s Self>) -> Self {
         let value = all.flat_map(|s| s.value.iter().copied()).collect();
         Self {
@@ -79,7 +83,7 @@ impl Series {
         }
     }
 
-    /// Deviation about the mean.
+    /// Standard deviation of the readings.
     #[must_use]
     pub fn spread(&self) -> f64 {
         let n = self.value.len().max(1) as f64;
@@ -88,8 +92,10 @@ impl Series {
     }
 }
 
-/// Gives each quaternion (four entries of a row from `first` on) the sign that is nearer to the one before: what lies between
-/// `q` and `-q` is no orientation.
+/// Gives each quaternion the sign closer to the one before: between `q` and `-q` lies no
+/// orientation.
+///
+/// A quaternion is four entries of a row from `first` on.
 fn align_signs(table: &mut [f64], width: usize, first: usize) {
     let mut before: Option<[f64; 4]> = None;
     for row in table.chunks_exact_mut(width) {
@@ -104,10 +110,10 @@ fn align_signs(table: &mut [f64], width: usize, first: usize) {
     }
 }
 
-/// One episode as series.
+/// One episode as time series.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// One an entry of a row of readings.
+    /// One series for each entry of a row of readings.
     pub readings: Vec<Series>,
     /// Times of the rows from the first on, s.
     pub time: Vec<f64>,
@@ -116,12 +122,12 @@ pub struct Recorded {
     /// Integrals of the commands up to each row, `rows x nu`.
     integral: Vec<f64>,
     nu: usize,
-    /// State at the first row, where the log has all of it.
+    /// State at the first row, if the log has all of it.
     pub start: Option<InitialState>,
 }
 
 impl Recorded {
-    /// Of an episode, with the columns of some sensors.
+    /// Creates the series of an episode, with the columns of some sensors.
     ///
     /// # Errors
     /// When the layout has no such sensor.
@@ -173,21 +179,22 @@ impl Recorded {
         self.time.last().copied().unwrap_or(0.0)
     }
 
-    /// What a quantity reads at a time under a view; NaN where nothing was read near it.
+    /// Reading of a quantity at a time under a view; NaN if nothing was read near it.
     #[must_use]
     pub fn reading(&self, view: ColumnView, time: f64, widest: f64) -> f64 {
         let x = self.readings[view.from].at(time + view.delay, widest);
         view.factor * x + view.offset
     }
 
-    /// Value and slope of a quantity at a time under a view.
+    /// Value and derivative of a quantity at a time under a view.
     #[must_use]
     pub fn local(&self, view: ColumnView, time: f64, half: f64) -> Option<(f64, f64)> {
         let (value, slope) = self.readings[view.from].local(time + view.delay, half)?;
         Some((view.factor * value + view.offset, view.factor * slope))
     }
 
-    /// Integral of an actuator's command up to a time; before the first row it was the same as in it.
+    /// Integral of an actuator's command up to a time; before the first row the first command
+    /// holds.
     fn integral(&self, actuator: usize, time: f64) -> f64 {
         let k = self.time.partition_point(|t| *t <= time);
         let k = k.saturating_sub(1);
@@ -195,7 +202,7 @@ impl Recorded {
             + self.ctrl[k * self.nu + actuator] * (time - self.time[k])
     }
 
-    /// Means of the commands from one time to another under a view, one an actuator.
+    /// Mean commands between two times under a view, one an actuator.
     #[must_use]
     pub fn commands(&self, view: &View, from: f64, to: f64) -> Vec<f64> {
         let mean = |v: &ColumnView| {

@@ -1,6 +1,6 @@
-//! Which faults of wiring make the log's columns sense to the model.
+//! Searches for the wiring faults whose correction makes the columns agree with the model.
 //!
-//! Hypotheses are looked at with few windows first, and those that lead with all.
+//! Hypotheses are evaluated on a few windows first, and the leading ones on all.
 
 mod clock;
 mod offset;
@@ -14,17 +14,18 @@ use super::record::Recorded;
 use super::view::View;
 use super::windows::{Misses, Windows};
 
-/// Faults that are looked for one after the other: beyond so many a log is better looked at by its owner.
+/// Largest number of faults that are searched for in turn: a log with more needs its owner's
+/// attention.
 const MOST: usize = 4;
 /// Hypotheses of a round that are evaluated with all windows.
 const LEADING: usize = 3;
 
-/// A fault, with what speaks for it.
+/// A fault, with its evidence.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Kind.
     pub fault: Fault,
-    /// Quantities concerned, as indices.
+    /// Indices of the quantities concerned.
     pub quantities: Vec<usize>,
     /// Logarithm of the factor by which misses shrink, summed over columns.
     pub shrinkage: f64,
@@ -32,14 +33,14 @@ pub struct Found {
     pub probability: f64,
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Faults, in the order in which they were found.
     pub found: Vec<Found>,
-    /// How the columns are read with all of them mended.
+    /// View of the columns with all of the faults corrected.
     pub view: View,
-    /// The nearest fault that is not named.
+    /// The most likely fault that is not named.
     pub next: Option<Found>,
 }
 
@@ -52,7 +53,7 @@ struct Tried {
 }
 
 impl Tried {
-    /// The fault, as it is told.
+    /// Returns the fault as it is reported.
     fn found(&self) -> Found {
         Found {
             fault: self.hypothesis.fault,
@@ -63,24 +64,27 @@ impl Tried {
     }
 }
 
-/// Logs and what is looked for in them.
+/// The logs, and the settings of the search.
 pub struct Search<'a> {
     /// Few windows.
     pub few: Windows<'a>,
     /// All windows.
     pub all: Windows<'a>,
-    /// All windows, with the damping of each joint that a position servo drives among the parameters; `None` where there is none.
+    /// All windows, with the damping of each joint that a position servo drives among the
+    /// parameters.
+    ///
+    /// `None` if there is no such joint.
     pub damped: Option<Windows<'a>>,
     /// The logs.
     pub record: &'a [Recorded],
     /// Their columns.
     pub quantities: &'a [Quantity],
-    /// When a fault is named.
+    /// Thresholds from which on a fault is named.
     pub settings: &'a Settings,
 }
 
 impl Search<'_> {
-    /// Looks for faults one after the other, each the best of its round.
+    /// Searches for faults in turn, each the best of its round.
     ///
     /// # Errors
     /// When the engine fails.
@@ -106,7 +110,7 @@ impl Search<'_> {
         Ok(outcome)
     }
 
-    /// The hypothesis of a round that shrinks misses most.
+    /// Returns the hypothesis of a round that shrinks misses most.
     fn best(&mut self, so_far: &Outcome) -> Result<Option<Tried>> {
         let view = &so_far.view;
         let given = self.all.misses(view)?;
@@ -133,7 +137,7 @@ impl Search<'_> {
         }
         let order = |a: &Tried, b: &Tried| {
             let by_probability = b.probability.total_cmp(&a.probability);
-            // Of what is certain, what shrinks misses more.
+            // Among certain hypotheses, the one that shrinks misses more comes first.
             by_probability.then(b.shrinkage.total_cmp(&a.shrinkage))
         };
         tried.sort_by(order);
@@ -150,7 +154,7 @@ impl Search<'_> {
                 best = Some(one);
             }
         }
-        // What is not named keeps its first size.
+        // A hypothesis that is not named keeps its first size.
         match best {
             Some(best) if best.probability >= self.settings.named => {
                 self.refined(view, best, &given).map(Some)
@@ -159,7 +163,8 @@ impl Search<'_> {
         }
     }
 
-    /// By what hypotheses are compared: how far they shrink misses, less what several faults at once must shrink them more than one.
+    /// Weight by which hypotheses are compared: their shrinkage, less a handicap if they combine
+    /// several faults.
     fn weight(&self, tried: &Tried) -> f64 {
         if tried.hypothesis.compound {
             tried.shrinkage - self.settings.rare
@@ -168,15 +173,17 @@ impl Search<'_> {
         }
     }
 
-    /// Quantities whose wiring is in question: columns that miss more than a share of the motion, and commands of the joints
-    /// that they read.
+    /// Which quantities are in question.
+    ///
+    /// These are the columns that miss more than a share of the motion, and the commands of the
+    /// joints that they read.
     fn suspects(&self, misses: &Misses, share: f64) -> Vec<bool> {
         let missed = Settings::missed(misses, share);
         let any = missed.iter().any(|m| *m);
         let drives = |joint: usize| {
             let readings = self.quantities.iter().filter(|q| !q.command);
             let mut own = readings.filter(|q| q.joint == Some(joint)).peekable();
-            // A joint that nothing reads shows in what others do.
+            // A joint that no sensor reads shows in the readings of others.
             (own.peek().is_none() && any) || own.any(|q| missed[q.place])
         };
         let of = |q: &Quantity| match (q.command, q.joint) {
@@ -187,14 +194,14 @@ impl Search<'_> {
         self.quantities.iter().map(of).collect()
     }
 
-    /// Whether the starts that logs give speak against a view.
+    /// Whether the initial states that logs give contradict a view.
     fn is_refuted(&mut self, given: &Misses, view: &View) -> Result<bool> {
         let misses = self.few.start_misses(view)?;
         let shrinkage = self.settings.logarithm(&given.start_miss, &misses);
         Ok(shrinkage < -self.settings.scale)
     }
 
-    /// A hypothesis with how far it shrinks misses, and its probability.
+    /// Computes the shrinkage of a hypothesis, and its probability.
     fn judged(&self, hypothesis: Hypothesis, given: &Misses, misses: &Misses) -> Tried {
         let shrinkage = self.settings.shrinkage(given, misses);
         let command = hypothesis
@@ -216,7 +223,7 @@ impl Search<'_> {
         }
     }
 
-    /// The same fault with its size fitted to all windows.
+    /// Returns the same fault with its size fitted to all windows.
     fn refined(&mut self, view: &View, found: Tried, given: &Misses) -> Result<Tried> {
         match found.hypothesis.fault {
             Fault::Offset => self.refined_offset(view, found, given),

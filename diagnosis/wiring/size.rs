@@ -1,7 +1,8 @@
-//! Sizes of offsets and delays: Gauss-Newton on the residuals of the windows, with bounded weights.
+//! Estimates offsets and delays by Gauss-Newton steps on the residuals of the windows, with bounded
+//! weights.
 //!
-//! A wrong mass answers a command later or earlier, as a wrong clock does. So the study's own parameters may be fitted beside
-//! a size.
+//! A wrong mass makes a drive respond later or earlier, as a wrong clock does. So the study's own
+//! parameters may be fitted together with the size.
 
 use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
@@ -9,29 +10,32 @@ use nalgebra::{DMatrix, DVector};
 use super::view::View;
 use super::windows::{Misses, Windows};
 
-/// Gauss-Newton steps. Misses are nearly linear in an offset over a window; a start several motions away takes some.
+/// Gauss-Newton steps. Misses are nearly linear in an offset over a window; an initial value
+/// several motions away takes some.
 const STEPS: usize = 4;
-/// Motions beyond which a residual counts no more than linearly (Huber's loss): some windows hold contacts.
+/// Residual, in motions, from which on the loss is linear (Huber's loss): some windows contain
+/// contacts.
 const HUBER: f64 = 1.0;
-/// Halvings of a step that does not help.
+/// Halvings of a step that does not lower the loss.
 const HALVINGS: usize = 3;
-/// Share of a parameter's range that slopes are taken over, and that a step is at most.
+/// Finite-difference step and largest step of a parameter, as shares of its range.
 const PARAMETER: (f64, f64) = (0.01, 0.3);
-/// What is added to the diagonal of the normal equations, as a share of it: parameters that do not show stay where they are.
+/// Added to the diagonal of the normal equations, as a share of it: parameters without influence
+/// stay where they are.
 const RIDGE: f64 = 1e-6;
-/// Loss of a residual where the engine failed, motions squared: beyond that of any finite one.
+/// Loss of a residual where the engine failed, motions squared: larger than any finite one.
 const FAILED: f64 = 1e3;
 
-/// What a size is fitted with.
+/// Settings of the fit of a size.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
-    /// Where it begins.
+    /// Initial value.
     pub start: f64,
-    /// Difference that slopes are taken over.
+    /// Finite-difference step.
     pub probe: f64,
-    /// Longest step.
+    /// Largest step.
     pub longest: f64,
-    /// Whether the study's parameters are fitted beside it.
+    /// Whether the study's parameters are fitted together with it.
     pub parameters: bool,
 }
 
@@ -50,7 +54,7 @@ fn loss(misses: &Misses) -> f64 {
     each.sum()
 }
 
-/// Step of Gauss and Newton from differences over `probes`.
+/// Gauss-Newton step from finite differences over `probes`.
 fn step(here: &Misses, there: &[Misses], probes: &[f64]) -> DVector<f64> {
     let (n, width) = (probes.len(), here.motion.len());
     let (mut gradient, mut curvature) = (DVector::zeros(n), DMatrix::zeros(n, n));
@@ -73,11 +77,14 @@ fn step(here: &Misses, there: &[Misses], probes: &[f64]) -> DVector<f64> {
     solved.map_or_else(|| DVector::zeros(n), |x| -x)
 }
 
-/// Slope of a reading in an offset of it below which windows do not tell the offset.
+/// Root mean square derivative of a reading with respect to its offset, below which windows do not
+/// show the offset.
 const TELLS: f64 = 0.05;
 
-/// How much larger a size would have to be for some windows, from their misses at it and at one that is larger by `probe`; `None` where
-/// it does not show in them.
+/// How much larger a size would have to be for some windows.
+///
+/// `here` are their misses at the size, `there` those at a size larger by `probe`. `None` if the
+/// size has no influence on them.
 #[must_use]
 pub fn further(here: &Misses, there: &Misses, probe: f64) -> Option<f64> {
     let pairs = here.residual.iter().zip(&there.residual);
@@ -88,7 +95,8 @@ pub fn further(here: &Misses, there: &Misses, probe: f64) -> Option<f64> {
     (sum > TELLS * TELLS * n).then(|| step(here, std::slice::from_ref(there), &[probe])[0])
 }
 
-/// The size at which misses are least, with these misses. The windows keep the parameters that go with it.
+/// Returns the size with the smallest loss, and its misses. The windows keep the matching
+/// parameters.
 ///
 /// # Errors
 /// When the engine fails.
@@ -123,7 +131,7 @@ pub fn fit(
         let mut there = Vec::with_capacity(at.len());
         let mut signed = probes.clone();
         for k in 0..at.len() {
-            // Away from the far end of its range.
+            // The step goes the other way at the upper end of the range.
             if k > 0 && at[k] + probes[k] > ranges[k - 1][1] {
                 signed[k] = -probes[k];
             }

@@ -1,4 +1,4 @@
-//! What the columns of a log are taken to mean: one view of all of them is one hypothesis on the wiring.
+//! A view of the columns of a log: one hypothesis about what they mean.
 
 use asid_logs::episode::ColumnMapping;
 
@@ -7,16 +7,16 @@ use asid_logs::episode::ColumnMapping;
 pub struct ColumnView {
     /// Column of the log, counted like the quantities themselves.
     pub from: usize,
-    /// Factor.
+    /// Factor applied to the column.
     pub factor: f64,
     /// Added after the factor, in the quantity's unit.
     pub offset: f64,
-    /// How late it is, s.
+    /// How late the column is, s.
     pub delay: f64,
 }
 
 impl ColumnView {
-    /// The quantity's own column, as it is.
+    /// Returns the view of the quantity's own column, unchanged.
     #[must_use]
     pub fn own(column: usize) -> Self {
         Self {
@@ -27,7 +27,7 @@ impl ColumnView {
         }
     }
 
-    /// The same column read in a unit of its own: what it was, times a factor.
+    /// Returns the view of the same column in another unit: its value times a factor.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self {
@@ -41,14 +41,14 @@ impl ColumnView {
 /// A view of all columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// One an entry of a row of readings.
+    /// One view for each entry of a row of readings.
     pub readings: Vec<ColumnView>,
-    /// One an actuator.
+    /// One view for each actuator.
     pub commands: Vec<ColumnView>,
 }
 
 impl View {
-    /// The log as it is given.
+    /// Returns the view of the log as it is given.
     #[must_use]
     pub fn as_given(readings: usize, commands: usize) -> Self {
         Self {
@@ -58,11 +58,13 @@ impl View {
     }
 }
 
-/// Relative difference up to which a factor is that of a unit.
+/// Largest relative difference from a unit's factor at which a factor counts as that unit.
 const SAME_FACTOR: f64 = 1e-9;
 
-/// The mapping that makes a log mean what a view says of the quantity `name`, whose columns are named `columns`; in a unit
-/// named among `units` where the factor is its. `None` where it changes nothing.
+/// Returns the mapping that reads the quantity `name` as a view says; `None` if it changes nothing.
+///
+/// The log's columns are named `columns`. The mapping names one of `units` if the factor is that of
+/// the unit.
 #[must_use]
 pub fn mapping(
     name: &str,
@@ -92,10 +94,11 @@ pub fn mapping(
     Some(mapping)
 }
 
-/// Significant digits of an estimate in a mending line: what is rounded off lies below the noise of any log.
+/// Significant digits of an estimate in a mapping line: what is rounded off is below the noise of
+/// any log.
 const DIGITS: usize = 5;
 
-/// A number with a few significant digits.
+/// Rounds a number to a few significant digits.
 pub fn rounded(x: f64) -> f64 {
     if x == 0.0 || !x.is_finite() {
         return x;

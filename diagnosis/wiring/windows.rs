@@ -1,10 +1,12 @@
-//! Short predictions by the model as given, from states that the log itself shows: under a wrong view of the columns they
-//! miss what the machine does next.
+//! Short predictions by the model as given, from states read off the log: under a wrong view they
+//! miss the motion.
 //!
-//! A window begins at a state that is read off the log (positions by local parabolas, speeds by their slopes) and lasts long
-//! enough for forces to show beyond the noise. Two things are measured for each quantity: how far the prediction is off,
-//! and how far the quantity leaves the straight line on which it began, which is what a prediction is to tell. Windows at
-//! the first row begin a second time at the state that the log gives there, where it does: this compares readings with it.
+//! A window begins at a state that is read off the log: positions from local parabolas, speeds from
+//! their derivatives. It lasts long enough for forces to exceed the noise. Each quantity has two
+//! measures. The miss is the distance of the prediction from the readings. The motion is the
+//! distance of the quantity from its initial straight line, which is what a prediction must
+//! explain. Where a log gives its initial state, a second window at the first row begins there:
+//! this compares the readings with that state.
 
 mod initial_state;
 mod misses;
@@ -22,37 +24,40 @@ use super::view::{ColumnView, View};
 pub use misses::Misses;
 use placement::{Window, duration, place};
 
-/// Windows over all episodes: so many give the mean of a miss to a seventh.
+/// Windows over all episodes: this many give the mean of a miss to a seventh.
 pub const WINDOWS: usize = 48;
-/// Windows over all episodes with which hypotheses are first looked at.
+/// Windows over all episodes in the first evaluation of hypotheses.
 pub const FEW: usize = 12;
-/// Physics steps of one evaluation at most, times degrees of freedom: beyond it there are fewer windows, so that some hundred
-/// evaluations take about a second.
+/// Largest number of physics steps of one evaluation, times degrees of freedom.
+///
+/// Beyond it there are fewer windows, so that some hundred evaluations take about a second.
 const BUDGET: usize = 60_000;
-/// Fewest windows, however dear one is.
+/// Fewest windows, however expensive each is.
 const FEWEST: usize = 6;
-/// Frames of a window at most.
+/// Largest number of frames of a window.
 const FRAMES: f64 = 24.0;
-/// Share of an episode that a window takes at most.
+/// Largest share of an episode that a window covers.
 const SHARE: f64 = 0.3;
-/// Share of a window before and after its start within which readings tell the state there. Larger: less noise of the state,
-/// and more of the motion's bend in it.
+/// Readings within this share of a window, before and after its start, determine the state there.
+///
+/// Larger: less noise in the state, and more of the motion's curvature.
 const LOCAL: f64 = 0.25;
 
-/// Windows of some logs, and the simulations to predict them.
+/// Windows of some logs, and the simulations that predict them.
 pub struct Windows<'a> {
     plant: &'a Plant,
     record: &'a [Recorded],
     simulator: Box<dyn Simulator>,
     recording: Recording,
-    /// Those from states read off the log, then those at given starts.
+    /// First those from states read off the log, then those at given initial states.
     windows: Vec<Window>,
-    /// Views of the commands, parameters, and what they predict from given starts, which no view of the readings changes.
+    /// Views of the commands, parameter values, and the predictions from given initial states with
+    /// them. No view of the readings changes these.
     from_starts: Option<(Vec<ColumnView>, Vec<f64>, Vec<f64>)>,
     parameters: &'a [Parameter],
     /// Values of the parameters.
     theta: Vec<f64>,
-    /// Names of the sensors, and where each begins in a row of readings.
+    /// Index of each sensor in the layout, and of its first entry in a row of readings.
     sensors: Vec<(usize, usize)>,
     duration: f64,
     frames: usize,
@@ -61,7 +66,7 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Places about `count` windows in logs; `None` where they are too short for any.
+    /// Places about `count` windows in the logs; returns `None` if the logs are too short for any.
     ///
     /// # Errors
     /// When the engine refuses a batch.
@@ -142,8 +147,9 @@ impl<'a> Windows<'a> {
         self.theta = theta.to_vec();
     }
 
-    /// What would have to be added to a quantity so that it reads what the given starts say: the median over the episodes
-    /// that give theirs.
+    /// Shift that makes a quantity's first readings equal the given initial states.
+    ///
+    /// It is the median over the episodes that give their initial state.
     ///
     /// # Errors
     /// When the engine fails.
@@ -155,12 +161,12 @@ impl<'a> Windows<'a> {
         let mut firsts: Vec<f64> = firsts.filter(|x| x.is_finite()).collect();
         Ok(crate::noise::median(&mut firsts))
     }
-    /// Number of windows that do not begin at given starts.
+    /// Number of windows that do not begin at given initial states.
     fn free(&self) -> usize {
         self.windows.partition_point(|w| !w.given)
     }
 
-    /// Readings that the model predicts in some windows under a view, `windows x (frames + 1) x width`.
+    /// Predicts the readings in some windows under a view, `windows x (frames + 1) x width`.
     fn predict(&mut self, view: &View, range: std::ops::Range<usize>) -> Result<Vec<f64>> {
         let (nu, width) = (view.commands.len(), self.width);
         let frame = self.duration / self.frames as f64;
@@ -206,7 +212,7 @@ impl<'a> Windows<'a> {
             .collect())
     }
 
-    /// What the model predicts from given starts.
+    /// Predicts the readings from given initial states.
     fn predict_from_starts(&mut self, view: &View) -> Result<Vec<f64>> {
         if let Some((commands, theta, told)) = &self.from_starts
             && *commands == view.commands
@@ -219,7 +225,7 @@ impl<'a> Windows<'a> {
         Ok(told)
     }
 
-    /// Predicts all windows under a view.
+    /// Predicts all windows under a view, and returns what the predictions miss.
     ///
     /// # Errors
     /// When the engine fails.
@@ -230,8 +236,10 @@ impl<'a> Windows<'a> {
         Ok(self.summed_up(view, residual))
     }
 
-    /// Mean magnitude of each quantity's residual in windows at given starts, in motions; 0 where there are none. Costs no
-    /// simulation where only readings are viewed another way.
+    /// Mean magnitude of each quantity's residual in windows at given initial states, in motions; 0
+    /// if there are none.
+    ///
+    /// Costs no simulation if only the views of readings differ.
     ///
     /// # Errors
     /// When the engine fails.

@@ -1,4 +1,5 @@
-//! Readings on another clock: all are late by the time that shrinks misses most, and no drive is.
+//! Readings on another clock: all are late by the time that shrinks misses most, and no drive is
+//! late.
 
 use asid_core::Result;
 
@@ -8,13 +9,13 @@ use crate::wiring::size::{self, Fit};
 use crate::wiring::view::View;
 use crate::wiring::windows::Misses;
 
-/// Time that the slope in a delay is taken over, s.
+/// Finite-difference step of a delay, s.
 const DELAY_PROBE: f64 = 2e-3;
-/// Longest step of a delay, s: that of the first scan.
+/// Largest step of a delay, s: that of the first scan.
 const DELAY_STEP: f64 = 0.02;
 
 impl Search<'_> {
-    /// Readings that are all late by the time that shrinks misses most; `None` where it is small.
+    /// Delay of all readings that shrinks misses most; `None` if it is small.
     pub(super) fn clock(&mut self, view: &View, given: &Misses) -> Result<Option<Tried>> {
         let at = |delay: f64| hypotheses::delayed(view, delay);
         let mut best = (0.0, 0.0);
@@ -46,16 +47,19 @@ impl Search<'_> {
         Ok(Some(self.judged(hypothesis, given, &misses)))
     }
 
-    /// Whether a delay is one that a clock may have.
+    /// Whether a clock may have this delay.
     fn is_a_clocks(&self, delay: f64) -> bool {
         let within = (hypotheses::EARLIEST..=hypotheses::LATEST).contains(&delay);
         within && delay.abs() >= self.settings.delay
     }
 
-    /// A clock with its delay fitted to all windows, and the study's parameters beside it; improbable where a delay of all
-    /// commands says as much: then it is the drives' own. Of a machine with one drive nothing but a start in motion can tell
-    /// the two apart; of one with several, all drives are seldom late alike. Improbable too where friction says as much: a position servo
-    /// of gain `kp` lags behind its command by `damping / kp`.
+    /// Fits the delay of a clock, and the study's parameters with it, to all windows.
+    ///
+    /// The clock becomes improbable if a delay of all commands shrinks misses as much: the drives
+    /// themselves are then late. With one drive, only an initial state in motion separates the two.
+    /// With several, all drives are seldom late alike. It also becomes improbable if friction
+    /// shrinks misses as much: a position servo of gain `kp` lags behind its command by `damping /
+    /// kp`.
     pub(super) fn clock_or_drive(
         &mut self,
         view: &View,
@@ -93,7 +97,7 @@ impl Search<'_> {
     }
 }
 
-/// How a delay is fitted.
+/// Settings of the fit of a delay.
 fn delay_fit(start: f64, parameters: bool) -> Fit {
     Fit {
         start,

@@ -1,4 +1,4 @@
-//! A column with another zero: of the size that shrinks misses most.
+//! A column with another zero, shifted by the offset that shrinks misses most.
 
 use asid_core::Result;
 
@@ -9,20 +9,20 @@ use crate::wiring::size::{self, Fit};
 use crate::wiring::view::View;
 use crate::wiring::windows::Misses;
 
-/// Share of a column's deviation that the slope in its offset is taken over.
+/// Finite-difference step of an offset, in the column's standard deviation.
 const OFFSET_PROBE: f64 = 0.05;
-/// Longest step of an offset, in the column's deviation.
+/// Largest step of an offset, in the column's standard deviation.
 const OFFSET_STEP: f64 = 1.0;
 
 impl Search<'_> {
-    /// Deviation of a column over all logs, in the quantity's unit.
+    /// Standard deviation of a column over all logs, in the quantity's unit.
     fn spread(&self, view: &View, quantity: &Quantity) -> f64 {
         let own = view_of(view, quantity);
         let all = self.record.iter().map(|r| &r.readings[own.from]);
         own.factor.abs() * Series::joined(all).spread()
     }
 
-    /// Another zero of a column, of the size that shrinks misses most; `None` where it is small.
+    /// Offset of a column that shrinks misses most; `None` if it is small.
     pub(super) fn offset(
         &mut self,
         view: &View,
@@ -30,13 +30,15 @@ impl Search<'_> {
         given: &Misses,
     ) -> Result<Option<Tried>> {
         let quantity = &self.quantities[index];
-        // The zero of a frame in space is no column's, and where bodies touch any shift of it changes what they do.
+        // The zero of a frame in space belongs to no column. Where bodies touch, any shift of it
+        // changes what they do.
         if quantity.command || quantity.name != quantity.whole {
             return Ok(None);
         }
         let spread = self.spread(view, quantity);
         let at = |size: f64| shifted(view, quantity, size);
-        // A start that the log gives tells it at once, and without the model's own faults.
+        // An initial state given by the log shows the offset directly, without the model's own
+        // errors.
         let told = self.few.start_shift(view, quantity.place)?;
         let size = match told {
             Some(size) => size,
@@ -56,8 +58,11 @@ impl Search<'_> {
         Ok(Some(self.judged(hypothesis, given, &misses)))
     }
 
-    /// Whether another zero of a column makes too little sense for one that is another late in the logs than early: it must shrink misses the more,
-    /// the more of itself it changes by. A reading that drifts away has a mean as well.
+    /// Whether the offset of a column is rejected because it changes between the halves of the
+    /// logs.
+    ///
+    /// A reading that drifts has a mean as well. So the more the offset changes, relative to its
+    /// size, the more it must shrink misses.
     pub(super) fn is_drift(
         &mut self,
         (view, hypothesis): (&View, &Hypothesis),
@@ -83,7 +88,7 @@ impl Search<'_> {
         Ok(self.settings.probability(shrinkage, change) < self.settings.named)
     }
 
-    /// The same offset, fitted to all windows.
+    /// Returns the same offset, fitted to all windows.
     pub(super) fn refined_offset(
         &mut self,
         view: &View,
@@ -91,7 +96,7 @@ impl Search<'_> {
         given: &Misses,
     ) -> Result<Tried> {
         let quantity = &self.quantities[found.hypothesis.quantities[0]];
-        // Given starts have told it.
+        // Given initial states already determine it.
         if self.all.start_shift(view, quantity.place)?.is_some() {
             return Ok(found);
         }
@@ -108,7 +113,7 @@ impl Search<'_> {
     }
 }
 
-/// How an offset is fitted to a column with some deviation.
+/// Settings of the fit of an offset to a column with some standard deviation.
 fn offset_fit(spread: f64, start: f64) -> Fit {
     Fit {
         start,
@@ -118,7 +123,7 @@ fn offset_fit(spread: f64, start: f64) -> Fit {
     }
 }
 
-/// A view with the zero of one quantity moved.
+/// Returns a view with the offset of one quantity changed.
 fn shifted(view: &View, quantity: &Quantity, by: f64) -> View {
     let mut own = view_of(view, quantity);
     own.offset += by;

@@ -1,4 +1,4 @@
-//! Faults that shrink misses and are none: what shrinks them is not what the fault says.
+//! Rejects faults that shrink misses for another reason than the one they state.
 
 use asid_core::Result;
 
@@ -8,12 +8,14 @@ use crate::wiring::hypotheses::{Fault, Hypothesis, Quantity, view_of, with};
 use crate::wiring::view::View;
 use crate::wiring::windows::Misses;
 
-/// Part of the shrinkage of a column, on average over all, that those of driven joints must have under another clock: right clocks of the training
-/// half have 0.6 of it and more there, a wrong one 0.05.
+/// Share of the mean shrinkage of all columns that driven joints must have under another clock.
+///
+/// Clocks of the training half that are right have 0.6 and more, a wrong one 0.05.
 const DRIVEN: f64 = 0.5;
 
 impl Search<'_> {
-    /// Whether a fault, seen upon a view, is refused for the way in which it shrinks misses from those `given`.
+    /// Whether a fault is rejected because of the way in which it shrinks the misses `given` of a
+    /// view.
     pub(super) fn is_refused(
         &mut self,
         (view, hypothesis): (&View, &Hypothesis),
@@ -28,8 +30,10 @@ impl Search<'_> {
             || self.is_drift((view, hypothesis), (given, misses))?)
     }
 
-    /// Whether a unit makes a column larger that would then be in question again. With a unit that is far too large everything flies
-    /// on, so that the column says nothing against the model, and nothing for it.
+    /// Whether a unit enlarges a column that would then still be in question.
+    ///
+    /// With a unit that is far too large everything moves straight on, so the column says nothing
+    /// against the model, and nothing for it.
     fn is_nonsense(&self, view: &View, hypothesis: &Hypothesis, misses: &Misses) -> bool {
         let missed = Settings::missed(misses, self.settings.nonsense);
         let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
@@ -39,9 +43,11 @@ impl Search<'_> {
         hypothesis.fault == Fault::Unit && readings.any(|q| missed[q.place])
     }
 
-    /// Whether another view of readings makes sense of other columns and none of its own, which still misses more than it moves, and
-    /// nearly as much as before. A column that drifts away takes the state with it from which the others are predicted: in a larger unit
-    /// it would be still, and the others make sense.
+    /// Whether another view of a column improves other columns only.
+    ///
+    /// Its own column then still misses more than it moves, and nearly as much as before. A column
+    /// that drifts takes along the state from which the others are predicted. In a larger unit it
+    /// would be still, and the others would make sense.
     fn is_of_others(&self, hypothesis: &Hypothesis, given: &Misses, misses: &Misses) -> bool {
         let missed = Settings::missed(misses, 1.0);
         let of = |place: usize| {
@@ -58,9 +64,12 @@ impl Search<'_> {
             && own.any(|place| missed[place] && of(place) < self.settings.even)
     }
 
-    /// Whether a fault makes less sense of some log than it must make of all to be as likely as not to be there. Wiring is the same in every log; a
-    /// joint that stands otherwise at the start of each, or further off from one to the next, is no wiring. A clock is not asked for this: one
-    /// drive that sticks for a whole log hides it there.
+    /// Whether a fault increases the misses of some log by as much as it must shrink those of all
+    /// for even odds.
+    ///
+    /// Wiring is the same in every log. A joint that begins at another position in each log, or
+    /// further off from one log to the next, is no wiring fault. Clocks are exempt: one drive that
+    /// sticks for a whole log hides them there.
     fn is_of_some_logs(&self, hypothesis: &Hypothesis, given: &Misses, misses: &Misses) -> bool {
         let tells = |log: usize| {
             let [from, to] = [given, misses].map(|m| self.all.of_log(m, log));
@@ -70,8 +79,10 @@ impl Search<'_> {
             && (0..self.record.len()).any(|log| tells(log) < -self.settings.even)
     }
 
-    /// Whether a clock shows in what no drive moves, and hardly in the joints that commands move. Those answer late
-    /// under a late clock; a frame that hangs in the air, or lies still, says nothing of commands.
+    /// Whether a clock improves what no drive moves, and hardly the joints that commands move.
+    ///
+    /// Those joints respond late under a late clock. A frame that hangs in the air, or lies still,
+    /// says nothing about commands.
     fn is_of_undriven(&self, hypothesis: &Hypothesis, given: &Misses, misses: &Misses) -> bool {
         let commands = self.quantities.iter().filter(|q| q.command);
         let driven: Vec<usize> = commands.filter_map(|q| q.joint).collect();
@@ -90,8 +101,10 @@ impl Search<'_> {
         hypothesis.fault == Fault::Clock && !own.is_empty() && of_each(own) <= DRIVEN * of_each(all)
     }
 
-    /// Whether a unit makes a command smaller and leaves no more of it than no command at all would. Where a drive answers late, that it
-    /// does not answer misses less of the motion than that it answers too early, and says nothing of the unit.
+    /// Whether a unit makes a command smaller and is no better than no command at all.
+    ///
+    /// Where a drive responds late, a prediction without any response misses less of the motion
+    /// than one that responds too early. That says nothing about the unit.
     fn is_silence(
         &mut self,
         view: &View,

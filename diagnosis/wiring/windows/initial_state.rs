@@ -1,4 +1,5 @@
-//! Initial state of a window, read off the log: positions by local parabolas, speeds by their slopes.
+//! Initial state of a window, read off the log: positions from local parabolas, speeds from their
+//! derivatives.
 
 use asid_core::problem::home;
 use asid_core::signal::{rotation_difference, unit_quaternion};
@@ -11,7 +12,7 @@ use crate::wiring::record::Recorded;
 use crate::wiring::view::{ColumnView, View};
 
 impl Windows<'_> {
-    /// State at the start of a window under a view.
+    /// Returns the initial state of a window under a view.
     pub(super) fn state(&self, view: &View, window: Window) -> (Vec<f64>, Vec<f64>) {
         let layout = &self.plant.layout;
         let record = &self.record[window.episode];
@@ -58,7 +59,7 @@ impl Windows<'_> {
                 _ => {}
             }
         }
-        // A speed that only a sensor of speed tells.
+        // Speeds that only a velocity sensor reads.
         for &(index, first) in &self.sensors {
             if let (Reads::Joint(j), "jointvel") =
                 (self.plant.sensors[index], &*layout.sensors[index].kind)
@@ -72,8 +73,9 @@ impl Windows<'_> {
     }
 }
 
-/// Orientation at a time, and the angular velocity about the body's own axes, rad/s, from `half` a second before and after;
-/// `None` where a reading is missing.
+/// Orientation at a time, and the angular velocity about the body's own axes, rad/s.
+///
+/// The velocity is taken from `half` a second before and after. `None` if a reading is missing.
 fn orientation(
     record: &Recorded,
     views: &[ColumnView; 4],

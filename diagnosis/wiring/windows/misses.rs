@@ -1,27 +1,29 @@
-//! What predictions miss: residuals of the windows, and their means in motions.
+//! Misses of the predictions: residuals of the windows, and their means in units of the motion.
 
 use super::placement::Window;
 use super::{LOCAL, Windows};
 use crate::wiring::view::View;
 
-/// A prediction that is off by more than so many motions tells no more than that it is wrong.
+/// Largest counted miss, in motions: beyond it, a prediction is simply wrong.
 const FARTHEST: f64 = 10.0;
 
-/// What predictions under a view miss.
+/// Misses of the predictions under a view.
 #[derive(Clone, Debug)]
 pub struct Misses {
-    /// `reading - prediction`, `windows x frames x width`; NaN where nothing was read, infinite where the engine failed.
+    /// `reading - prediction`, `windows x frames x width`; NaN without a reading, infinite if the
+    /// engine failed.
     pub residual: Vec<f64>,
-    /// Mean distance of each quantity from its straight line, over the windows that begin at states read off the log.
+    /// Mean distance of each quantity from its straight line, over windows from states read off the
+    /// log.
     pub motion: Vec<f64>,
     /// Mean magnitude of each quantity's residual over those windows, in motions.
     pub miss: Vec<f64>,
-    /// The same at given starts; 0 where there are none.
+    /// The same over windows at given initial states; 0 if there are none.
     pub start_miss: Vec<f64>,
 }
 
 impl Windows<'_> {
-    /// `reading - prediction` in the windows from one on.
+    /// Returns `reading - prediction` in the windows from index `first` on.
     pub(super) fn residuals(&self, view: &View, told: &[f64], first: usize) -> Vec<f64> {
         let (rows, width) = (self.frames + 1, self.width);
         let frame = self.duration / self.frames as f64;
@@ -55,7 +57,8 @@ impl Windows<'_> {
         residual
     }
 
-    /// The two signs of a quaternion are one orientation: the nearer one is compared.
+    /// Chooses the sign of each quaternion closer to the prediction: both signs are one
+    /// orientation.
     fn nearer_signs(&self, read: &mut [f64], told: &[f64]) {
         for &(index, at) in &self.sensors {
             if self.plant.layout.sensors[index].len != 4 {
@@ -68,7 +71,7 @@ impl Windows<'_> {
         }
     }
 
-    /// Means over the windows.
+    /// Computes the motion and the mean misses of all windows.
     pub(super) fn summed_up(&self, view: &View, residual: Vec<f64>) -> Misses {
         let (rows, width) = (self.frames + 1, self.width);
         let frame = self.duration / self.frames as f64;
@@ -95,13 +98,14 @@ impl Windows<'_> {
         self.means(residual, motion, |_| true)
     }
 
-    /// The same of one log's windows, in motions of all.
+    /// Returns the misses of one log's windows, in motions of all logs.
     pub fn of_log(&self, misses: &Misses, log: usize) -> Misses {
         let (residual, motion) = (misses.residual.clone(), misses.motion.clone());
         self.means(residual, motion, |w| w.episode == log)
     }
 
-    /// The same of the windows that begin in the later half of their log, or in the earlier.
+    /// Returns the misses of the windows in the later or the earlier half of their log; others are
+    /// NaN.
     pub fn of_half(&self, misses: &Misses, later: bool) -> Misses {
         let mut out = misses.clone();
         let window = (self.frames + 1) * self.width;
@@ -149,7 +153,8 @@ impl Windows<'_> {
         }
     }
 
-    /// Whether a quantity is a place or an angle, which runs on along its slope, and no speed or force.
+    /// Whether a quantity is a position or an angle, which continues along its derivative; speeds
+    /// and forces do not.
     fn is_place(&self, entry: usize) -> bool {
         let sensors = self.sensors.iter().rev();
         let found = sensors.clone().find(|(_, first)| *first <= entry);
@@ -160,7 +165,7 @@ impl Windows<'_> {
     }
 }
 
-/// Root mean square; `None` of nothing.
+/// Root mean square; `None` if there are no values.
 fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     for x in values {
@@ -170,7 +175,7 @@ fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0.0).then(|| (sum / count).sqrt())
 }
 
-/// Mean; `None` of nothing.
+/// Mean; `None` if there are no values.
 pub(super) fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

@@ -1,4 +1,4 @@
-//! Where windows lie in the logs, and how long they last.
+//! Placement of the windows in the logs, and their duration.
 
 use super::misses::mean;
 use super::{LOCAL, WINDOWS};
@@ -6,23 +6,25 @@ use crate::wiring::hypotheses::LATEST;
 use crate::wiring::record::Recorded;
 use crate::wiring::view::ColumnView;
 
-/// Durations of windows that are tried, the shortest first, s.
+/// Durations of windows that are tried, shortest first, s.
 const DURATIONS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
-/// Deviations of the prediction's noise by which a quantity has to leave its straight line for a window to be long enough.
+/// Multiple of the noise by which a quantity must leave its straight line for a window to be long
+/// enough.
 const SHOWS: f64 = 8.0;
 
-/// A window: where it begins.
+/// A window, by its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     /// Index of its log.
     pub(super) episode: usize,
-    /// Time, s.
+    /// Start time, s.
     pub(super) start: f64,
-    /// Whether it begins at the state that the log gives.
+    /// Whether it begins at the initial state that the log gives.
     pub(super) given: bool,
 }
 
-/// The shortest duration over which most quantities leave their straight lines by more than a prediction's noise.
+/// Shortest duration over which most quantities leave their straight lines by clearly more than the
+/// noise.
 pub(super) fn duration(record: &[Recorded], width: usize, longest: f64) -> f64 {
     let fits = |d: f64| -> bool {
         let half = LOCAL * d;
@@ -62,7 +64,7 @@ pub(super) fn duration(record: &[Recorded], width: usize, longest: f64) -> f64 {
     last
 }
 
-/// Windows spread evenly over the episodes, and one at each start that a log gives.
+/// Windows spread evenly over the episodes, and one at each initial state that a log gives.
 pub(super) fn place(record: &[Recorded], duration: f64, count: usize) -> Vec<Window> {
     let each = count.div_ceil(record.len().max(1));
     let mut windows = Vec::new();
@@ -71,7 +73,7 @@ pub(super) fn place(record: &[Recorded], duration: f64, count: usize) -> Vec<Win
         if room <= 0.0 {
             continue;
         }
-        // Readings that are late are looked for after their window.
+        // Late readings are searched for after the end of their window.
         let room = (room - LATEST).max(0.5 * room);
         windows.extend((0..each).map(|k| Window {
             episode,
