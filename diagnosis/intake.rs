@@ -1,4 +1,5 @@
-//! What happens to logs before any physics: outliers are left out, dead sensors passed over, wiring is mended, and all is said.
+//! Prepares logs before any physics: leaves out outliers, skips dead sensors, corrects the wiring,
+//! and reports all of it.
 
 mod absent;
 mod estimated_short;
@@ -19,38 +20,42 @@ pub use estimated_short::Short;
 use open_loop::OpenLoop;
 pub use unchanging::{Unchanging, pass_over};
 
-/// Share of the power of what replays of the model as given leave of a column, as a geometric mean over the columns concerned, up to which
-/// such a fault is the more probable cause: what is left is then less than what the fault explains.
+/// Share of the residual power up to which corrected wiring is the more probable cause.
+///
+/// The power is that of replays of the model as given, as a geometric mean over the columns
+/// concerned. Below this share the remainder is less than what the fault explains.
 const HALF: f64 = 0.5;
 
 /// Name of the fault that all readings are late or early.
 const CLOCK: &str = "wiring-clock";
-/// Name of the fault that a reading is shifted.
+/// Name of the fault that a reading has another zero.
 const ZERO: &str = "wiring-offset";
 
 /// A study whose logs are ready for a diagnosis.
 pub struct Intake {
-    /// The study, with outliers left out of its logs and its wiring as it is taken.
+    /// The study without outliers in its logs, with the wiring that is in use.
     pub study: Study,
-    /// The other way to take the wiring, where all that was mended is in doubt.
+    /// The study with the other wiring, if everything that was corrected is in doubt.
     other: Option<Study>,
-    /// Whether the wiring of `study` is the mended one.
+    /// Whether `study` has the corrected wiring.
     is_mended: bool,
-    /// Faults of wiring that can be mended.
+    /// Wiring faults that can be corrected.
     wiring: Vec<WiringResult>,
-    /// The mappings that mend them.
+    /// The mappings that correct them.
     mappings: Vec<ColumnMapping>,
-    /// The study before it was mended, where a clock was: readings are interpolated once, for each time makes their noise more alike.
+    /// The study before the correction, if a clock was corrected.
+    ///
+    /// Readings must be interpolated only once: each interpolation correlates their noise further.
     before: Option<Study>,
     left_out: Vec<LeftOut>,
     /// Sensors that some logs read and others do not.
     absent: Vec<Absent>,
-    /// Sensors that never change, and are passed over.
+    /// Sensors that never change and are skipped.
     unchanging: Vec<Unchanging>,
 }
 
 impl Intake {
-    /// Looks at the logs of a study.
+    /// Checks and prepares the logs of a study.
     ///
     /// # Errors
     /// When the engine fails.
@@ -99,13 +104,13 @@ impl Intake {
         Ok(intake)
     }
 
-    /// The study, and the other way to take its wiring where there is one.
+    /// Returns the study, and the study with the other wiring if there is one.
     #[must_use]
     pub fn ways(&self) -> (&Study, Option<&Study>) {
         (&self.study, self.other.as_ref())
     }
 
-    /// Takes the wiring the other way.
+    /// Switches to the other wiring.
     pub fn turn(&mut self) {
         if let Some(other) = &mut self.other {
             std::mem::swap(&mut self.study, other);
@@ -113,7 +118,7 @@ impl Intake {
         }
     }
 
-    /// Stays with the way that the wiring is taken.
+    /// Keeps the present wiring.
     pub fn settle(&mut self) {
         self.other = None;
         if !self.is_mended {
@@ -121,7 +126,7 @@ impl Intake {
         }
     }
 
-    /// Says in a result what was done, and what the noise is like.
+    /// Adds to a result what was done to the logs, and what the noise is like.
     pub fn tell(&self, result: &mut DiagnosisResult, whiteness: CheckResult) {
         let first = result.checks.iter().position(|c| c.check != "data");
         let at = first.unwrap_or(result.checks.len());
@@ -143,7 +148,8 @@ impl Intake {
         }
     }
 
-    /// What was passed over or mended in the logs, sensors that cannot be used first; nothing where nothing was.
+    /// Returns the check of what was skipped or corrected in the logs, unusable sensors first;
+    /// `None` if there is nothing.
     fn log_check(&self) -> Option<CheckResult> {
         let unchanging = self.unchanging.iter().map(Unchanging::line);
         let unusable = unchanging.chain(self.absent.iter().map(Absent::line));
@@ -215,8 +221,11 @@ impl Intake {
     }
 }
 
-/// Power of what the mended wiring leaves of the columns concerned in replays of the model as given, relative to what the wiring `as_given`
-/// leaves: the geometric mean over the columns, which needs no noise and weighs them alike.
+/// Residual power of the columns concerned with the corrected wiring, relative to that with the
+/// wiring `as_given`.
+///
+/// It is taken from replays of the model as given. The geometric mean over the columns needs no
+/// noise and weights them equally.
 fn share_left(intake: &Intake, as_given: &Study, machine: &Machine) -> Result<f64> {
     let [mended, given] = [&intake.study, as_given].map(|s| open_loop_power(s, machine));
     let concerned = |sensor: &str| {
@@ -230,7 +239,8 @@ fn share_left(intake: &Intake, as_given: &Study, machine: &Machine) -> Result<f6
     Ok((logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp())
 }
 
-/// Mean square of what replays of the model as given leave of each sensor's training readings, in its unit.
+/// Mean squared residual of each sensor's training readings in replays of the model as given, in
+/// its unit squared.
 fn open_loop_power(study: &Study, machine: &Machine) -> Result<Vec<(String, f64)>> {
     let replayed = OpenLoop::of(study, machine)?;
     let (logs, residuals) = (replayed.logs(), replayed.residuals());
@@ -251,7 +261,7 @@ fn open_loop_power(study: &Study, machine: &Machine) -> Result<Vec<(String, f64)
     Ok(names.enumerate().map(of_sensor).collect())
 }
 
-/// A fault of wiring in words.
+/// Describes a wiring fault in words.
 fn in_words(wiring: &WiringResult) -> String {
     let columns: Vec<String> = wiring.columns.iter().map(|c| format!("`{c}`")).collect();
     let columns = columns.join(" and ");

@@ -1,9 +1,8 @@
 //! The difference of two readings of tracked signals.
 //!
-//! It is *whitened*: divided by the standard deviation
-//! of the sensor's noise, rotations compared as rotations. The same differences
-//! make the likelihood (identification), the sensitivity (information) and the
-//! gap (diagnosis).
+//! The difference is *whitened*: divided by the standard deviation of the sensor's noise, with
+//! rotations compared as rotations. The same differences make the likelihood (identification), the
+//! sensitivity (information) and the gap (diagnosis).
 
 use asid_core::layout::JointKind;
 use asid_core::signal::{Signal, rotation_difference, unit_quaternion};
@@ -56,8 +55,10 @@ impl SignalSet {
         })
     }
 
-    /// The same with the positions of hinges known as angles, which a layout does not tell from those of slides: `scene` says which
-    /// joint a sensor reads. `signals` are those that it was made of.
+    /// Returns the same set with the positions of hinges marked as angles.
+    ///
+    /// A layout does not separate these from the positions of slides, so `scene` provides the joint
+    /// that each sensor reads. `signals` are those that the set was made of.
     ///
     /// # Errors
     /// When the scene's document is not valid MJCF.
@@ -78,20 +79,22 @@ impl SignalSet {
         Ok(self)
     }
 
-    /// Entries of a reading's row.
+    /// Number of entries of a reading's row.
     #[must_use]
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Entries of a whitened difference: three for an orientation.
+    /// Number of entries of a whitened difference: three for an orientation.
     #[must_use]
     pub fn whitened_len(&self) -> usize {
         self.whitened
     }
 
-    /// Whether each entry of a whitened difference is an angle: those of an orientation, and of a hinge where
-    /// [`SignalSet::with_angles_of`] told.
+    /// Whether each entry of a whitened difference is an angle.
+    ///
+    /// Angles are the entries of an orientation, and of a hinge after
+    /// [`SignalSet::with_angles_of`].
     #[must_use]
     pub fn angles(&self) -> Vec<bool> {
         let parts = self.parts.iter();
@@ -137,8 +140,10 @@ impl SignalSet {
         }
     }
 
-    /// Shifts a reading by `offset`, `whitened_len` entries in the sensors' units: numbers are added,
-    /// a rotation vector (rad) turns an orientation about the axes of its object.
+    /// Shifts a reading by `offset`, `whitened_len` entries in the sensors' units.
+    ///
+    /// Numbers are added. A rotation vector (rad) rotates an orientation about the axes of its
+    /// object.
     pub fn add_offset(&self, reading: &mut [f64], offset: &[f64]) {
         let mut k = 0;
         for part in &self.parts {
@@ -163,8 +168,9 @@ mod tests {
     use super::*;
     use asid_core::layout::{Joint, Sensor};
 
-    /// Symptom: a tracked angle of a hinge had the prior of a tracked position, 0.001 m, in place of 0.005 rad. Cause: it was sought by
-    /// a unit that no sensor has: that of a joint's position is m or rad, by the joint.
+    /// Symptom: a tracked hinge angle had the prior of a tracked position, 0.001 m, instead of
+    /// 0.005 rad. Cause: the search was by a unit that no sensor has, since a joint position is m
+    /// or rad depending on the joint.
     #[test]
     fn an_angle_is_known_by_the_joint_that_its_sensor_reads() {
         let xml = r#"<mujoco><worldbody><body><joint name="turn"/><geom size="0.1"/></body>

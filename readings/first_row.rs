@@ -1,10 +1,14 @@
-//! Readings of a log's first row that a command before the log decides.
+//! Readings of a log's first row that depend on a command before the log.
 //!
-//! The force of a drive, an acceleration or the pressure below a foot follows the command that acts when it is read. In the first row that is a
-//! command from before the log begins, which no row holds. A simulation begins without command. Where a log does too, its machine was idle before, and the two
-//! agree; where its first command is another one, no model can predict such a reading, however right it is, and it counts as missing.
-//! Which sensors follow which actuator is found by a trial, so that it holds on any engine and for any sensor: in states along a replay of a log each
-//! actuator in turn has had another command for a step, and the state is then put back.
+//! The force of a drive, an acceleration or the pressure below a foot follows the command that acts
+//! when it is read. In the first row that is a command from before the log, which no row contains.
+//! A simulation begins without a command. If the log's first command is zero, the machine was idle
+//! before, and the two agree. If it is not, no model can predict such a reading, however right it
+//! is, and the reading counts as missing.
+//!
+//! A trial finds which sensors follow which actuator, so that this works on any engine and for any
+//! sensor. In states along a replay of a log, each actuator in turn gets another command for one
+//! step, and the state is then restored.
 
 use asid_core::episode::InitialState;
 use asid_core::simulator::BatchConfig;
@@ -12,12 +16,14 @@ use asid_core::{Control, Episode, Model, Recording, Result, Rollout, Simulator};
 
 use crate::replay::ReplayPlan;
 
-/// States of a replay in which sensors are tried: a foot may be off the ground in some.
+/// States of a replay in which sensors are tested: a foot may be off the ground in some.
 const STATES: usize = 8;
-/// Share of a reading by which it must differ to follow a command: a solver of contacts ends within a millionth.
+/// Relative difference of a reading that shows that it follows a command: a contact solver ends
+/// within a millionth.
 const DIFFERS: f64 = 1e-4;
 
-/// Batch of one simulation that has had the commands of the log, and one for each actuator that has had another command.
+/// Batch of simulations: one with the commands of the log, and one for each actuator with another
+/// command.
 struct Trial {
     simulator: Box<dyn Simulator>,
     sims: Vec<usize>,
@@ -45,15 +51,18 @@ impl Trial {
         })
     }
 
-    /// Puts the first simulation into a state of an episode.
+    /// Sets the first simulation to a state of an episode.
     fn begin(&mut self, start: &InitialState) -> Result<()> {
         self.simulator.reset(&self.sims)?;
         self.simulator
             .set_state(&self.sims[..1], &start.qpos, &start.qvel)
     }
 
-    /// Marks the entries of the sensors that follow the command of each actuator in the present state of the first simulation, and leaves that as it is;
-    /// `commands` has a row of commands for each simulation, `follows` a row of entries for each actuator.
+    /// Marks the entries of the sensors that follow the command of each actuator in the present
+    /// state.
+    ///
+    /// The state is that of the first simulation, and stays as it is. `commands` has a row of
+    /// commands for each simulation, `follows` a row of entries for each actuator.
     fn mark(&mut self, commands: &[f64], follows: &mut [bool]) -> Result<()> {
         let (n, width) = (self.sims.len(), self.sensors.width());
         let simulator = &mut *self.simulator;
@@ -79,7 +88,7 @@ impl Trial {
             .zip(follows.chunks_exact_mut(width));
         for (other, follows) in each {
             for ((follows, a), b) in follows.iter_mut().zip(first).zip(other) {
-                // What has diverged is not larger than anything.
+                // A diverged reading (NaN or infinite) marks nothing: the comparison is false.
                 *follows |= (a - b).abs() > DIFFERS * a.abs().max(b.abs());
             }
         }
@@ -87,7 +96,10 @@ impl Trial {
     }
 }
 
-/// For each simulation of a [`Trial`] the commands of the first row, those of one actuator replaced by the one of the log that is farthest from it.
+/// Commands for each simulation of a [`Trial`].
+///
+/// They are those of the first row. For each actuator, its command is replaced by the one of the
+/// log that is farthest from it.
 fn commands(episode: &Episode, nu: usize) -> Vec<f64> {
     let first = &episode.ctrl[..nu];
     let farthest = |a: usize| {
@@ -105,14 +117,15 @@ fn commands(episode: &Episode, nu: usize) -> Vec<f64> {
     first.iter().copied().chain(moved).collect()
 }
 
-/// For each actuator of a scene the sensors that follow its command at once.
+/// For each actuator of a scene, the sensors that follow its command at once.
 #[derive(Clone, Debug, Default)]
 pub struct Followers {
     of_actuators: Vec<Vec<String>>,
 }
 
 impl Followers {
-    /// Of the sensors of a log, in states along a replay of it from a start.
+    /// Finds the followers among the sensors of a log, in states along a replay from an initial
+    /// state.
     ///
     /// # Errors
     /// As [`Simulator::rollout`].
@@ -151,7 +164,9 @@ impl Followers {
         })
     }
 
-    /// Takes the readings that follow a command from before an episode out of its first row: those of actuators whose first command is not zero.
+    /// Removes the readings that follow a command from before an episode from its first row.
+    ///
+    /// These are the followers of actuators whose first command is not zero.
     pub fn open(&self, episode: &mut Episode) {
         let commanded = self.of_actuators.iter().zip(episode.ctrl.clone());
         let commanded = commanded.filter(|(_, command)| *command != 0.0);

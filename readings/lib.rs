@@ -1,10 +1,10 @@
-//! A log's readings in a simulator, and how two readings differ.
+//! Readings of a log in a simulator, and the difference of two readings.
 //!
-//! - [`replay`] plays a log's commands and says what the sensors would have read at each of its rows.
-//! - [`first_row`] tells which readings of a log's first row a command before the log decides.
+//! - [`replay`] plays a log's commands and predicts the sensors' readings at each of its rows.
+//! - [`first_row`] finds the readings of a log's first row that depend on a command before the log.
 //! - [`SignalSet`] whitens the difference of two readings.
-//! - [`noise`] tells the noise of a sensor from its readings.
-//! - [`systematic`] whitens by the systematic errors of a tracker as well.
+//! - [`noise`] estimates the noise of a sensor from its readings.
+//! - [`systematic`] also whitens by the systematic errors of a tracker.
 
 mod difference;
 pub mod first_row;

@@ -1,11 +1,14 @@
-//! The noise of a sensor: its deviation and correlation from third differences over one to 64 rows, which vanish for parabolas.
+//! Estimates the standard deviation and correlation of a sensor's noise from third differences,
+//! which vanish for parabolas.
 //!
-//! Over a number of rows twice as large those of correlated noise grow by at most two, until readings so far apart are independent.
-//! What a model misses grows faster: its own third differences, squared, by 64 where it is smooth, and by 8 where a rough force
-//! makes it, which a machine integrates twice. Noise and such a rest are told apart by how the differences grow; over rows where the rest
-//! outgrows the noise they tell nothing of it. Nor do differences across an impact, where what is read is no parabola.
+//! The differences are taken over 1 to 64 rows. When the number of rows doubles, the squared
+//! differences of correlated noise grow by a factor of at most two, until readings so far apart are
+//! independent. Those of a model error grow faster: by 64 if it is smooth, and by 8 if a rough
+//! force causes it, which a machine integrates twice. This growth separates noise and model error.
+//! Where the model error outgrows the noise, differences contain no information about the noise.
+//! Nor do differences across an impact, where readings are no parabola.
 
-/// Ratio of a normal variable's deviation to the median of its magnitude.
+/// Ratio of a normal variable's standard deviation to the median of its magnitude.
 pub const NORMAL: f64 = 1.482_602_218_505_602;
 
 /// Noise of one sensor.
@@ -15,8 +18,10 @@ pub struct Noise {
     pub deviation: f64,
     /// Correlation from one reading to the next; 0 for white noise.
     pub correlation: f64,
-    /// Largest deviation that is nearly as likely: noise that is slow beside what is read may be much larger than its differences over few
-    /// rows tell.
+    /// Largest standard deviation that is nearly as likely.
+    ///
+    /// Noise that is slow compared with the readings may be much larger than its differences over
+    /// few rows show.
     pub most: f64,
 }
 
@@ -31,15 +36,17 @@ impl Noise {
         }
     }
 
-    /// Readings in a row that count as one to what hardly changes over them: the ratio of the noise's spectral density at frequency zero to
-    /// that of white noise of the same deviation, `(1 + r) / (1 - r)` of first-order noise.
+    /// Number of successive readings that count as one for anything that hardly changes over them.
+    ///
+    /// It is the ratio of the noise's spectral density at frequency zero to that of white noise of
+    /// the same standard deviation: `(1 + r) / (1 - r)` for first-order noise.
     #[must_use]
     pub fn alike(self) -> f64 {
         (1.0 + self.correlation) / (1.0 - self.correlation)
     }
 }
 
-/// Median, `None` of nothing.
+/// Returns the median; `None` if there are no values.
 #[must_use]
 pub fn median(values: &mut [f64]) -> Option<f64> {
     if values.is_empty() {
@@ -49,34 +56,46 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Squared deviation of the third differences of white noise of deviation 1: 1 + 9 + 9 + 1.
+/// Variance of the third differences of white noise of standard deviation 1: 1 + 9 + 9 + 1.
 const WHITE: f64 = 20.0;
-/// Growth from a number of rows to twice as many from which on what is rough is the rest and no noise: twice the most of noise.
+/// Growth over a doubling of the rows from which on differences show the model error: twice the
+/// largest of noise.
 const SMOOTH: f64 = 4.0;
-/// Growth of a rest that a rough force makes, and of a smooth one.
+/// Growth of a model error over a doubling of the rows: from a rough force, and from a smooth one.
 const RESTS: [f64; 2] = [8.0, 64.0];
-/// How much worse than the best correlation a smaller one may fit and still be preferred, times the number of differences: half
-/// the variance of the logarithm of a squared median of `n` normal magnitudes, which is `4 / (4 n f(m)^2 m^2) = 5.4 / n` with the density `f` of
-/// the magnitude at its median `m`.
+/// Misfit above the best one up to which a smaller correlation is preferred.
+///
+/// A misfit is a sum of squared logarithms, each times its number of differences. The logarithm of
+/// a squared median of `n` normal magnitudes has the variance `4 / (4 n f(m)^2 m^2) = 5.4 / n`,
+/// with the density `f` of the magnitude at its median `m`. The limit is half of that variance.
 const TIE: f64 = 2.7;
-/// The same of a correlation that is nearly as likely: two deviations of that logarithm, squared.
+/// Misfit above the best one up to which a correlation is nearly as likely: the square of two
+/// standard deviations of that logarithm.
 const NEARLY: f64 = 4.0 * 5.4;
-/// Largest correlation from row to row that is called noise: slower changes are the model's.
+/// Largest correlation from row to row that counts as noise: slower changes belong to the model.
 const SLOWEST: f64 = 0.97;
-/// Deviations of neighbouring rows' third differences from which on there is an impact between them: of normal noise one in two million.
+/// Third difference over neighbouring rows, in standard deviations, that shows an impact: for
+/// normal noise one in two million.
 const IMPACT: f64 = 5.0;
-/// Third differences that a correlation is told from, at least.
+/// Fewest third differences from which a correlation is estimated.
 const FEWEST: usize = 200;
-/// Rows that a third difference spans at most, where readings are missing: over more of them a residual is no parabola.
+/// Largest number of rows that a third difference spans if readings are missing: over more a
+/// residual is no parabola.
 const SPAN: usize = 12;
-/// Rows over which third differences are taken. Noise of the largest correlation that is called noise is independent over the last, to
-/// 0.97^64 = 0.14; over fewer rows its differences only double from stride to stride, whatever its deviation.
+/// Rows over which third differences are taken.
+///
+/// Over the last of them even noise of the largest correlation is independent, to 0.97^64 = 0.14.
+/// Over fewer rows its differences only double from stride to stride, whatever its standard
+/// deviation.
 const STRIDES: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
-/// Strides that a correlation is told from, at least: noise, its correlation and a rest are three unknowns.
+/// Fewest strides from which a correlation is estimated: noise, its correlation and a model error
+/// are three unknowns.
 const FEWEST_STRIDES: usize = 3;
 
-/// Magnitude of the third difference of a series (row, time, value) from some reading on, scaled so that those of white noise of
-/// deviation 1 have the deviation sqrt(20), whatever the times between. `None` where it spans too many rows.
+/// Magnitude of the third difference of a series (row, time, value) from some reading on.
+///
+/// It is scaled so that white noise of standard deviation 1 gives sqrt(20), whatever the times
+/// between readings. `None` if it spans too many rows.
 fn third_difference(series: &[(usize, f64, f64)], from: usize, stride: usize) -> Option<f64> {
     let four = [0, 1, 2, 3].map(|k| series[from + k * stride]);
     if four[3].0 - four[0].0 > SPAN * stride {
@@ -94,7 +113,8 @@ fn third_difference(series: &[(usize, f64, f64)], from: usize, stride: usize) ->
     difference.is_finite().then_some(difference)
 }
 
-/// Number of impacts before each reading of a series, at which its neighbouring readings are no parabola.
+/// Number of impacts before each reading of a series; across an impact, neighbouring readings are
+/// no parabola.
 fn impacts_before(series: &[(usize, f64, f64)]) -> Vec<usize> {
     let starts = 0..series.len().saturating_sub(3);
     let each: Vec<f64> = starts
@@ -111,30 +131,32 @@ fn impacts_before(series: &[(usize, f64, f64)]) -> Vec<usize> {
     before
 }
 
-/// Squared deviation of the third differences of noise of deviation 1 with a correlation between its readings, relative to white noise.
+/// Variance of the third differences of noise of standard deviation 1 with a correlation, relative
+/// to white noise.
 fn squared(correlation: f64) -> f64 {
     let r = correlation;
     1.0 + 2.0 * (-15.0 * r + 6.0 * r * r - r * r * r) / WHITE
 }
 
-/// Third differences of some series of readings of one sensor, by stride.
+/// Third differences of some series of readings of one sensor, for each stride.
 #[derive(Debug, Default)]
 pub struct ThirdDifferences([Vec<f64>; STRIDES.len()]);
 
 impl ThirdDifferences {
-    /// Adds those of a series of readings: row, time (s) and value of each that is there.
+    /// Adds the differences of a series: row, time (s) and value of each reading that is present.
     pub fn add(&mut self, series: &[(usize, f64, f64)]) {
         let impacts = impacts_before(series);
         for (&stride, found) in STRIDES.iter().zip(&mut self.0) {
             let starts = 0..series.len().saturating_sub(3 * stride);
-            // Over a few rows the median is blind to impacts; over many, most differences would span one.
+            // Over a few rows the median is robust against impacts; over many, most differences
+            // would span one.
             let is_smooth = |i: &usize| stride == 1 || impacts[*i] == impacts[i + 3 * stride];
             let smooth = starts.filter(is_smooth);
             found.extend(smooth.filter_map(|i| third_difference(series, i, stride)));
         }
     }
 
-    /// Noise whose third differences are these: correlated noise and a rest.
+    /// Returns the noise that explains these differences, together with a model error.
     #[must_use]
     pub fn noise(mut self) -> Noise {
         let typical = |d: &mut Vec<f64>| (NORMAL * median(d).unwrap_or(0.0)).powi(2) / WHITE;
@@ -142,12 +164,12 @@ impl ThirdDifferences {
         let found: Vec<Found> = (self.0.iter_mut().zip(STRIDES))
             .take_while(|(d, _)| d.len() >= FEWEST)
             .map(|(d, stride)| Found {
-                // Differences that overlap tell of slow noise only once.
+                // Overlapping differences carry information about slow noise only once.
                 independent: d.len() as f64 / stride as f64,
                 squared: typical(d),
             })
             .collect();
-        // Up to where the rest outgrows the noise.
+        // Only up to where the model error outgrows the noise.
         let grows = |w: &[Found]| w[1].squared > SMOOTH * w[0].squared;
         let outgrown = found.windows(2).position(grows);
         let told = outgrown.map_or(found.len(), |k| k + 2);
@@ -167,7 +189,8 @@ impl ThirdDifferences {
                 .map(|f| f.1)
         };
         let most = within(NEARLY).fold(0.0, |most, n| f64::max(most, n.deviation));
-        // A rest that outgrows the noise passes for slow noise over the last of the rows: the least correlation is taken then.
+        // A model error that outgrows the noise looks like slow noise over the last rows, so the
+        // smallest correlation is taken.
         let is_least = outgrown.is_some() || within(TIE).any(|n| n.correlation == 0.0);
         let taken = if is_least {
             within(TIE).next()
@@ -178,16 +201,19 @@ impl ThirdDifferences {
     }
 }
 
-/// What the third differences over a number of rows are like.
+/// Summary of the third differences over a number of rows.
 struct Found {
-    /// Their squared deviation, relative to that of white noise.
+    /// Their variance, relative to that of white noise of standard deviation 1.
     squared: f64,
-    /// How many of them are independent, at least.
+    /// Lower bound of the number of independent ones.
     independent: f64,
 }
 
-/// Noise of a correlation beside a rest that grows so, by least squares relative to what was found, with how far it misses that: the
-/// sum of squared logarithms, each times the number of independent differences. `None` where there is no such noise.
+/// Fits noise of a correlation, together with a model error of some growth, by relative least
+/// squares.
+///
+/// Returns it with its misfit: the sum of squared logarithms, each times the number of independent
+/// differences. `None` if no such noise fits.
 fn fit(found: &[Found], correlation: f64, growth: f64) -> Option<(f64, Noise)> {
     let noise = |k: usize| squared(correlation.powi(STRIDES[k] as i32));
     let rest = |k: usize| growth.powi(k as i32);
@@ -222,7 +248,8 @@ fn fit(found: &[Found], correlation: f64, growth: f64) -> Option<(f64, Noise)> {
 mod tests {
     use super::*;
 
-    /// Noise of deviation 1 with a correlation from row to row, from sums of uniform numbers.
+    /// Noise of standard deviation 1 with a correlation from row to row, from sums of uniform
+    /// numbers.
     fn coloured(correlation: f64, rows: usize) -> Vec<f64> {
         let mut state = 12345_u64;
         let mut uniform = || {
@@ -253,7 +280,8 @@ mod tests {
 
     #[test]
     fn filtered_noise_has_its_own_deviation() {
-        // With a tenth for the scatter of an estimate whose correlation is estimated beside it, more where it is strong.
+        // The tolerance allows for the scatter of the estimate, whose correlation is estimated too;
+        // it is larger for strong ones.
         for (correlation, tolerance) in [
             (0.0, 0.05),
             (0.3, 0.05),
@@ -282,7 +310,7 @@ mod tests {
             .chunks_exact(rows)
             .map(|c| c.iter().sum::<f64>() / rows as f64);
         let variance = means.map(|m| m * m).sum::<f64>() / 200.0;
-        // Of 200 means, a variance is known to a tenth.
+        // From 200 means a variance is known to a tenth.
         assert!(
             (variance * rows as f64 / noise.alike()).ln().abs() < 0.3,
             "{variance}"
@@ -291,7 +319,8 @@ mod tests {
 
     #[test]
     fn slow_noise_beside_a_swing_may_be_larger_than_its_fast_part_tells() {
-        // Third differences over few rows double with the rows, whatever the deviation; over more the swing outgrows them.
+        // Third differences over few rows double with the rows, whatever the standard deviation;
+        // over more the swing outgrows them.
         let swing = |k: usize| 300.0 * (0.02 * k as f64).sin();
         let noise = coloured(0.95, 4000).into_iter().enumerate();
         let found = noise_of(noise.map(|(k, x)| x + swing(k)));
@@ -300,7 +329,7 @@ mod tests {
 
     #[test]
     fn a_smooth_residual_is_no_noise() {
-        // White noise of deviation 1 on a swing a hundred times as large.
+        // White noise of standard deviation 1 on a swing a hundred times as large.
         let swing = |k: usize| 100.0 * (0.01 * k as f64).sin();
         let noise = noise_of(
             coloured(0.0, 5000)
@@ -314,7 +343,8 @@ mod tests {
 
     #[test]
     fn what_a_missing_force_makes_is_no_slow_noise() {
-        // A mass that a white force pushes against a spring and a damper, beside correlated noise of deviation 1.
+        // A mass pushed by a white force against a spring and a damper, plus correlated noise of
+        // standard deviation 1.
         let pushed = |rows: usize, size: f64| {
             let force = coloured(0.0, rows + 1);
             let (mut x, mut v) = (0.0, 0.0);
@@ -341,7 +371,7 @@ mod tests {
 
     #[test]
     fn impacts_make_no_noise() {
-        // A ball that bounces every 0.7 s, read beside two coordinates that do not.
+        // A ball that bounces every 0.7 s, together with two coordinates without impacts.
         let bounces = |k: usize| {
             let t = (0.01 * k as f64) % 0.7;
             1000.0 * (3.4 * t - 4.9 * t * t)

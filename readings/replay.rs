@@ -6,18 +6,18 @@
 use asid_core::layout::JointKind;
 use asid_core::{Control, Episode, Layout, Recording, Result, Rollout, Simulator};
 
-/// How a log's commands are replayed, and how its rows lie among the recorded states.
+/// How a log's commands are replayed, and how its rows are interpolated from the recorded states.
 #[derive(Clone, Debug)]
 pub struct ReplayPlan {
     /// Commands, `frames x nu`.
     pub ctrl: Vec<f64>,
     /// Frames of the rollout.
     pub frames: usize,
-    /// Physics steps a frame.
+    /// Physics steps per frame.
     pub substeps: usize,
     rows: usize,
-    /// For each row, the earlier of the two recorded states (0 is the start) and how far
-    /// beyond it the row lies; `None` where every row is a recorded state.
+    /// For each row, the earlier of the two recorded states (0 is the initial state) and the
+    /// fraction of a step by which the row is later; `None` if every row is a recorded state.
     between: Option<Vec<(usize, f64)>>,
 }
 
@@ -34,7 +34,7 @@ impl ReplayPlan {
             .map(|t| (t - start) / dt)
             .collect();
         let stride = steps[1].round();
-        // Within a thousandth of a step a row is on the grid: times are often rounded in logs.
+        // A row within a thousandth of a step counts as on the grid: logs often round times.
         let regular = stride >= 1.0
             && steps
                 .iter()
@@ -74,21 +74,23 @@ impl ReplayPlan {
         }
     }
 
-    /// Rows of the log that are replayed.
+    /// Number of rows of the log that are replayed.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Physics steps of one replay.
+    /// Number of physics steps of one replay.
     #[must_use]
     pub fn physics_steps(&self) -> usize {
         self.frames * self.substeps
     }
 
-    /// The log's rows from what was recorded: `first` is the state at the start (`width`),
-    /// `recorded` the states at the ends of the frames (`frames x width`), `quaternions`
-    /// where quaternions begin in a row; `out` is `rows x width`.
+    /// Computes the log's rows from what was recorded.
+    ///
+    /// `first` is the initial state (`width`), `recorded` the states at the ends of the frames
+    /// (`frames x width`). `quaternions` are the indices of quaternions in a row, and `out` is
+    /// `rows x width`.
     pub fn resample(
         &self,
         first: &[f64],
@@ -115,7 +117,7 @@ impl ReplayPlan {
     }
 }
 
-/// Where the quaternions among some sensors and positions of joints begin in a row of them.
+/// Indices of the quaternions in a row of some sensors and joint positions.
 #[must_use]
 pub fn quaternions(layout: &Layout, recording: &Recording, channels: &[String]) -> Vec<usize> {
     channels
@@ -145,7 +147,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Prepares `episode` for a scene; `channels` are what is predicted.
+    /// Prepares `episode` for a scene; `channels` are the predicted ones.
     ///
     /// # Errors
     /// When the scene has no such channel.
@@ -159,25 +161,25 @@ impl Replay {
         })
     }
 
-    /// Rows of the log.
+    /// Number of rows of the log.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.plan.rows
     }
 
-    /// Entries of a predicted row.
+    /// Number of entries of a predicted row.
     #[must_use]
     pub fn width(&self) -> usize {
         self.recording.width()
     }
 
-    /// Physics steps of one replay.
+    /// Number of physics steps of one replay.
     #[must_use]
     pub fn physics_steps(&self) -> usize {
         self.plan.physics_steps()
     }
 
-    /// Memory that one replay is recorded and predicted in, bytes.
+    /// Memory for recording and predicting one replay, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let rows = self.plan.frames + self.plan.rows;
@@ -219,8 +221,8 @@ impl Replay {
     }
 }
 
-/// Linear between `a` and `b`; quaternions (which start at `quaternions`) along
-/// the shorter arc and normalised.
+/// Interpolates linearly between `a` and `b`; quaternions, which begin at `quaternions`, along the
+/// shorter arc and normalised.
 fn interpolate(a: &[f64], b: &[f64], along: f64, quaternions: &[usize], out: &mut [f64]) {
     for (o, (x, y)) in out.iter_mut().zip(a.iter().zip(b)) {
         *o = x + along * (y - x);

@@ -1,28 +1,31 @@
-//! Systematic errors of a tracker: what is wrong with all readings of an episode alike.
+//! Systematic errors of a tracker, which are common to all readings of an episode.
 //!
-//! A tracker is late by some milliseconds, and its frame is registered with the machine's to a millimetre or
-//! two. Neither averages out over an episode's readings, so a likelihood that knows of noise alone takes both for
-//! motion of the object, and is sure of it. Here both have a normal prior and are integrated out: with the
-//! slopes `V` of the whitened readings by these errors, in their deviations, the readings have the
-//! covariance `I + V V^T` (Rasmussen and Williams 2006, section 2.7: basis functions with a prior on their weights),
-//! and a residual is whitened by its Cholesky factor. Entry by entry that is a Kalman filter of constant states: what
-//! comes out are the innovations in their deviations. So the whitened residual of the first part of an episode
-//! is the first part of the whitened residual. No simulation is spent on any of it.
+//! A tracker is late by some milliseconds, and its frame is registered with the machine's to a
+//! millimetre or two. Neither averages out over an episode's readings. A likelihood with noise
+//! alone takes both for motion of the object, with false certainty. Here both have a normal prior
+//! and are integrated out. With the derivatives `V` of the whitened readings with respect to these
+//! errors, in their prior standard deviations, the readings have the covariance `I + V V^T`
+//! (Rasmussen and Williams 2006, section 2.7: basis functions with a prior on their weights). A
+//! residual is whitened by the Cholesky factor of this covariance. Entry by entry that is a Kalman
+//! filter of constant states, and the result is its normalised innovations. So the whitened
+//! residual of the first part of an episode is the first part of the whitened residual. None of
+//! this needs a simulation.
 
 use asid_core::tracker::TrackerPrior;
 use nalgebra::{DMatrix, DVector};
 
 use crate::SignalSet;
 
-/// Slopes of an episode's whitened readings by the systematic errors of its trackers.
+/// Derivatives of an episode's whitened readings with respect to the systematic errors of its
+/// trackers.
 #[derive(Clone, Debug)]
 pub struct SystematicErrors {
-    /// Errors x entries, in deviations of the errors.
+    /// Errors x entries, in prior standard deviations of the errors.
     slopes: DMatrix<f64>,
 }
 
 impl SystematicErrors {
-    /// Of predicted readings (`rows x width`) and their times (s).
+    /// Computes the derivatives for predicted readings (`rows x width`) and their times (s).
     #[must_use]
     pub fn at(errors: TrackerPrior, signals: &SignalSet, time: &[f64], predicted: &[f64]) -> Self {
         let (width, len) = (signals.width(), signals.whitened_len());
@@ -66,8 +69,10 @@ impl SystematicErrors {
         Self { slopes }
     }
 
-    /// Whitens a residual (`rows x whitened_len`, in deviations of the noise) by noise and systematic errors
-    /// together; where `present` is false there is no reading, and the entry stays as it is.
+    /// Whitens a residual by noise and systematic errors together.
+    ///
+    /// The residual is `rows x whitened_len`, in standard deviations of the noise. Where `present`
+    /// is false there is no reading, and the entry stays as it is.
     pub fn whiten(&self, present: &[bool], residual: &mut [f64]) {
         let n = self.slopes.nrows();
         if n == 0 {

@@ -1,10 +1,11 @@
-//! Sensors that some logs of a study read and others do not: a column that was named otherwise, or was not recorded.
+//! Sensors that some logs of a study read and others do not: their column has another name, or was
+//! not recorded.
 
 use asid_core::Episode;
 
 use crate::study::Study;
 
-/// Logs that are named at most; the rest is counted.
+/// Largest number of logs that are named; the rest is counted.
 const NAMED: usize = 4;
 
 /// A sensor that some logs read and others do not.
@@ -16,12 +17,12 @@ pub struct Absent {
     pub logs: Vec<String>,
     /// Whether these are all logs to fit to.
     pub never_fitted: bool,
-    /// Whether these are all logs held out.
+    /// Whether these are all held-out logs.
     pub never_held_out: bool,
 }
 
 impl Absent {
-    /// What is told of it, in one line.
+    /// Describes the sensor in one line.
     #[must_use]
     pub fn line(&self) -> String {
         let mut logs: Vec<String> = self.logs.iter().take(NAMED).cloned().collect();
@@ -51,7 +52,7 @@ fn reads(episode: &Episode, sensor: &str) -> bool {
         .any(|row| row[columns.clone()].iter().any(|x| x.is_finite()))
 }
 
-/// The sensors that some logs of a study read and others do not, in the order of the scene's.
+/// Returns the sensors that some logs of a study read and others do not, in the scene's order.
 #[must_use]
 pub fn absent<'s>(study: &Study, sensors: impl IntoIterator<Item = &'s str>) -> Vec<Absent> {
     let of = |sensor: &str| {

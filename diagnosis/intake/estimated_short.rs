@@ -1,5 +1,8 @@
-//! What the mending of a clock or of a zero was estimated short by: it is estimated over short windows of a model as given, and the fit to whole
-//! logs knows it better. What comes out as an effect then is the rest of the fault, and belongs into the same line of the study's file.
+//! The rest of a clock or an offset that the correction of the wiring underestimated.
+//!
+//! The correction is estimated over short windows of the model as given. The fit to whole logs is
+//! more accurate, and its verdict then has the rest of the fault as an effect. It belongs into the
+//! same line of the study's file.
 
 use asid_core::registry::find;
 use asid_core::{Layout, Result};
@@ -11,16 +14,16 @@ use crate::result::WiringResult;
 use crate::wiring;
 use crate::wiring::view::rounded;
 
-/// The rest of what was mended.
+/// The rest of the corrected faults.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Short {
-    /// Further seconds by which all readings are late.
+    /// Additional delay of all readings, s.
     pub clock: Option<f64>,
-    /// What is further to be added to columns, each with its name, in the unit of the reading.
+    /// Additional offsets of columns, each with its name, in the unit of the reading.
     pub zeros: Vec<(String, f64)>,
 }
 
-/// The values of an effect at a sensor, of the kind that is asked for.
+/// The values of an effect of some kind at a sensor.
 fn values_at<'e>(
     effects: &'e [EffectSpec],
     sensor: &str,
@@ -32,7 +35,8 @@ fn values_at<'e>(
     Some(&own.values)
 }
 
-/// The place of a column among the values of a shift: that of a number first, then those of a vector's entries.
+/// Index of a column among the values of a shift: that of a scalar first, then those of a vector's
+/// entries.
 fn place_of<'c>(column: &'c str, sensor: &'c str) -> Option<usize> {
     match column.strip_prefix(sensor)? {
         "" => Some(0),
@@ -41,8 +45,10 @@ fn place_of<'c>(column: &'c str, sensor: &'c str) -> Option<usize> {
 }
 
 impl Intake {
-    /// What a mended clock or zero was estimated short by, where a verdict has every sensor late after the clock was mended, or shifts a reading whose
-    /// zero was; `None` where it does neither.
+    /// Returns what is left of a corrected clock or offset, according to a verdict.
+    ///
+    /// A verdict shows it if it has every sensor late after a clock was corrected, or if it shifts
+    /// a reading whose offset was. `None` if it does neither.
     #[must_use]
     pub fn estimated_short(&self, effects: &[EffectSpec]) -> Option<Short> {
         let short = Short {
@@ -63,7 +69,7 @@ impl Intake {
         Some(delays.iter().sum::<f64>() / delays.len().max(1) as f64)
     }
 
-    /// Of the columns whose zero was mended, what takes a verdict's shift out of the readings.
+    /// Offsets that remove a verdict's shifts from the columns whose zero was corrected.
     fn zeros_short(&self, effects: &[EffectSpec]) -> Vec<(String, f64)> {
         let zeros = self.wiring.iter().filter(|w| w.fault == ZERO);
         let columns = zeros.flat_map(|w| &w.columns);
@@ -76,7 +82,7 @@ impl Intake {
         columns.filter_map(short).collect()
     }
 
-    /// Mends further what was estimated short, in the logs and in the lines for the study's file.
+    /// Corrects the rest of the faults, in the logs and in the lines for the study's file.
     ///
     /// # Errors
     /// When the logs are too short for it.
@@ -111,7 +117,7 @@ impl Intake {
         Ok(())
     }
 
-    /// The mended clock.
+    /// The corrected clock.
     pub(super) fn clock(&self) -> Option<&WiringResult> {
         self.wiring.iter().find(|w| w.fault == CLOCK)
     }

@@ -1,4 +1,4 @@
-//! What replays of the model as given leave of the readings, before any fit.
+//! Residuals of the readings in replays of the model as given, before any fit.
 
 use asid_core::Result;
 
@@ -9,7 +9,7 @@ use crate::predict::Point;
 use crate::prepare::{dataset, plain_residuals, set_reading_noise};
 use crate::study::Study;
 
-/// Replays of the logs to fit to.
+/// Replays of the training logs.
 pub(super) struct OpenLoop {
     bench: Bench,
     residuals: Vec<Vec<f64>>,
@@ -36,7 +36,9 @@ impl OpenLoop {
         &self.bench.train.logs
     }
 
-    /// Residuals `logged - predicted` in the sensors' units, one array `rows x entries` an episode, NaN where a reading is missing.
+    /// Residuals `logged - predicted` in the sensors' units.
+    ///
+    /// One array `rows x entries` an episode, NaN where a reading is missing.
     pub(super) fn residuals(&self) -> &[Vec<f64>] {
         &self.residuals
     }

@@ -1,8 +1,9 @@
-//! Sensors whose readings never change while the model's move: an encoder that is unplugged, a field that nobody fills.
+//! Sensors whose readings never change while the model's do: an unplugged encoder, a field that
+//! nobody fills.
 //!
-//! Readings without any third difference have no noise that could be told, and in units of none every gap is infinite. Where the model
-//! reads the same, that is no matter. Where it does not, such a sensor is passed over and named: what is wrong with it is not physics.
-//! A study that gives its noise has it counted.
+//! Readings without any third difference show no noise, and without a unit of noise every gap is
+//! infinite. That does not matter where the model reads the same. Where it does not, such a sensor
+//! is skipped and named: its fault is not physics. If the study gives its noise, the sensor counts.
 
 use asid_core::{Episode, Error, Result};
 
@@ -11,12 +12,17 @@ use crate::data::Logs;
 use crate::machine::Machine;
 use crate::study::Study;
 
-/// Third difference up to which four readings lie on a parabola, relative to the largest of them: what sums of doubles round.
+/// Third difference, relative to the largest of the readings, up to which four readings lie on a
+/// parabola.
+///
+/// It is the rounding of sums of doubles.
 const ROUNDING: f64 = 1e-14;
-/// Readings of a column at least of which it is said that they lie on a parabola, where they are not all alike.
+/// Fewest readings of a column that are tested for a parabola, unless they are all equal.
 const FEWEST: usize = 8;
-/// How far the model leaves what a sensor reads where that counts as no motion, relative to the readings, and of readings near 0 in the
-/// sensor's unit. Larger: more of what stands still in model and log is counted.
+/// Largest motion of the model, relative to a sensor's readings, that counts as none.
+///
+/// For readings near 0 it is in the sensor's unit. Larger: more sensors count that stand still in
+/// model and log.
 const STILL: f64 = 1e-9;
 
 /// A sensor whose readings never change.
@@ -26,14 +32,14 @@ pub struct Unchanging {
     pub sensor: String,
     /// SI unit.
     pub unit: String,
-    /// The one value that it reads; `None` where it counts evenly, or reads another in each log.
+    /// The one value that it reads; `None` if it counts evenly, or reads another value in each log.
     pub value: Option<f64>,
-    /// How much further the model moves it over a log than the readings do.
+    /// How much farther the model moves the reading over a log than the log does.
     pub moved: f64,
 }
 
 impl Unchanging {
-    /// What is told of it, in one line.
+    /// Describes the sensor in one line.
     #[must_use]
     pub fn line(&self) -> String {
         let Self { sensor, unit, .. } = self;
@@ -54,10 +60,13 @@ impl Unchanging {
     }
 }
 
-/// Takes the readings of sensors that never change out of a study's logs, where the model as given moves them; what they are.
+/// Removes the readings of sensors that never change from a study's logs, if the model as given
+/// moves them.
+///
+/// Returns these sensors.
 ///
 /// # Errors
-/// When the engine fails, or nothing else is read.
+/// When the engine fails, or no other sensor is read.
 pub fn pass_over(study: &mut Study, machine: &Machine) -> Result<Vec<Unchanging>> {
     let sensors = machine.plant.layout.sensors.iter().map(|s| &*s.name);
     let flat: Vec<String> = sensors
@@ -85,7 +94,7 @@ pub fn pass_over(study: &mut Study, machine: &Machine) -> Result<Vec<Unchanging>
     Ok(found)
 }
 
-/// Readings of each entry of a sensor in an episode, of those that are there.
+/// Finite readings of each entry of a sensor in an episode.
 fn entries(episode: &Episode, sensor: &str) -> Vec<Vec<f64>> {
     let columns = episode.channel(sensor).unwrap_or_default();
     let width = episode.width();
@@ -96,14 +105,14 @@ fn entries(episode: &Episode, sensor: &str) -> Vec<Vec<f64>> {
     columns.map(column).collect()
 }
 
-/// Whether a sensor has readings to fit to, and in none of these logs a third difference.
+/// Whether a sensor has readings to fit to, without any third difference in any of these logs.
 fn is_flat(study: &Study, sensor: &str) -> bool {
     let logs = study.train.iter();
     let all: Vec<Vec<f64>> = logs.flat_map(|(_, e)| entries(e, sensor)).collect();
     all.iter().any(|column| column.len() > 1) && all.iter().all(|column| lies_on_a_parabola(column))
 }
 
-/// Whether readings are all alike, or every four in a row of them lie on a parabola.
+/// Whether all readings are equal, or every four in a row lie on a parabola.
 fn lies_on_a_parabola(column: &[f64]) -> bool {
     if column.windows(2).all(|w| w[0] == w[1]) {
         return true;
@@ -113,7 +122,7 @@ fn lies_on_a_parabola(column: &[f64]) -> bool {
     column.len() >= FEWEST && column.windows(4).all(|w| third(w) <= ROUNDING * largest)
 }
 
-/// A flat sensor, where the model moves it otherwise.
+/// Describes a flat sensor; `None` if the model does not move it.
 fn unchanging(study: &Study, replayed: &OpenLoop, sensor: &str) -> Option<Unchanging> {
     let logs = replayed.logs();
     let place = logs.sensors.iter().position(|s| s.name == sensor)?;
@@ -133,7 +142,8 @@ fn unchanging(study: &Study, replayed: &OpenLoop, sensor: &str) -> Option<Unchan
     })
 }
 
-/// The widest range of what replays leave of a sensor's entry in a log; where they diverge, of what is finite.
+/// Widest range of the residuals of one of the sensor's entries in a log; of the finite ones if
+/// replays diverge.
 fn moved(logs: &Logs, residuals: &[Vec<f64>], sensor: usize) -> f64 {
     let n = logs.entries.len();
     let own = |j: &usize| logs.entries[*j].sensor == sensor;
@@ -151,7 +161,7 @@ fn moved(logs: &Logs, residuals: &[Vec<f64>], sensor: usize) -> f64 {
     widest
 }
 
-/// Takes the readings of a sensor out of an episode.
+/// Removes the readings of a sensor from an episode.
 fn empty(episode: &mut Episode, sensor: &str) {
     let (columns, width) = (episode.channel(sensor).unwrap_or_default(), episode.width());
     for row in episode.readings.chunks_exact_mut(width.max(1)) {
@@ -172,7 +182,7 @@ mod tests {
         assert!(lies_on_a_parabola(&of(&|k| 3.0 * k)));
         assert!(!lies_on_a_parabola(&of(&|k| (0.1 * k).sin())));
         assert!(!lies_on_a_parabola(&of(&|k| f64::from(k > 30.0))));
-        // Three readings lie on a parabola whatever they are.
+        // Three readings always lie on a parabola.
         assert!(!lies_on_a_parabola(&[0.0, 1.0, 5.0]));
     }
 }
