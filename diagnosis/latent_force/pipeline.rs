@@ -38,8 +38,8 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
-/// Share of the excess power without effects from which on the excess that is left counts as most
-/// of the gap: half, as in the decision ([`crate::decision`]).
+/// Excess power, relative to that without effects, from which on a remainder is most of the gap:
+/// half, as in the decision ([`crate::decision`]).
 const MOST: f64 = 0.5;
 
 /// What is kept of a search once its logs are released.

@@ -24,15 +24,17 @@ const FIRST_OF_SEGMENTS: (usize, usize) = (2, 8);
 /// Linearisations of a fit in segments that are not the longest: enough to initialise the longer
 /// ones.
 const SHORT: usize = 4;
-/// Share of the segments' rows that scatter by more than their noise from which on segments are not
-/// made longer. Replays that cannot be repeated lose what length gains.
+/// Share of the segments' rows from which on segments are not made longer, if these rows scatter by
+/// more than their noise.
+///
+/// Replays that cannot be repeated lose what length gains.
 const LOST: f64 = 0.3;
 
-/// Share of the segments whose last replay did not achieve what its derivatives predicted from
-/// which on segments are not made longer.
+/// Share of the segments from which on segments are not made longer, if their last replay did not
+/// achieve what its derivatives predicted.
 ///
 /// The evidence of such segments rests on misleading derivatives. For pushed pucks that are read
-/// rarely, whose names then come out by chance, the share is a quarter and more. For balls that
+/// rarely, the share is a quarter and more in cases whose names come out by chance. For balls that
 /// roll and bounce it is a sixth at most.
 const MISLED: f64 = 0.2;
 

@@ -16,7 +16,7 @@ use super::{DEVIATIONS, Member, Tolerances, deviation_within};
 /// Largest predicted loss, in thresholds, at which a set is refitted without a name: first-order
 /// predictions are right to a factor of about three.
 const TANGENT: f64 = 3.0;
-/// Fraction of a tolerance from which on a value is at its end.
+/// Fraction of a tolerance from which on a value counts as being at its end.
 const AT_END: f64 = 0.95;
 
 impl Tolerances {
