@@ -1,21 +1,23 @@
-//! What is believed of one unknown: a Gaussian that is cut to the prior's box, or the odds of a binary unknown.
+//! Belief about one unknown: a Gaussian truncated to the prior's box, or the log-odds of a binary
+//! unknown.
 
 use asid_core::Parameter;
 use asid_core::rng::Rng;
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What is believed of one unknown.
+/// Belief about one unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Belief {
-    /// A Gaussian before it is cut to the prior's box, prior-scaled.
+    /// A Gaussian, prior-scaled; mean and standard deviation are those before truncation to the
+    /// prior's box.
     Gaussian {
         /// Mean.
         mean: f64,
         /// Standard deviation.
         std: f64,
     },
-    /// A binary unknown is 1 with these log-odds.
+    /// Log-odds that a binary unknown is 1.
     Binary {
         /// Logarithm of the odds.
         logit: f64,
@@ -28,8 +30,8 @@ fn phi(x: f64) -> f64 {
 }
 
 impl Belief {
-    /// Logarithm of the density at a prior-scaled value (of the probability of a binary one), less
-    /// that of the prior, in nats.
+    /// Log density at a prior-scaled value (log probability for a binary unknown) minus that of the
+    /// prior, in nats.
     #[must_use]
     pub fn log_ratio(self, z: f64) -> f64 {
         match self {
@@ -47,12 +49,13 @@ impl Belief {
         }
     }
 
-    /// A draw, prior-scaled.
+    /// Draws a value, prior-scaled.
     pub fn sample(self, rng: &mut Rng) -> f64 {
         match self {
             Self::Gaussian { mean, std } => {
                 let b = Parameter::scaled_bound();
-                // The mean lies in the box, so at least one draw in three does where it is wide.
+                // The mean lies in the box, so at least one draw in three does too where the
+                // Gaussian is wide.
                 for _ in 0..1000 {
                     let normal: f64 = StandardNormal.sample(rng);
                     let z = mean + std * normal;
@@ -69,8 +72,8 @@ impl Belief {
         }
     }
 
-    /// Whether a prior-scaled value lies in the central 95 %; of a binary one, whether it is the
-    /// more probable value.
+    /// Whether a prior-scaled value lies in the central 95 %; for a binary unknown, whether it is
+    /// the more probable value.
     #[must_use]
     pub fn covers(self, z: f64) -> bool {
         match self {
@@ -83,7 +86,7 @@ impl Belief {
         }
     }
 
-    /// Mean after the cut, prior-scaled.
+    /// Mean after truncation, prior-scaled.
     #[must_use]
     pub fn mean(self) -> f64 {
         match self {
@@ -98,7 +101,8 @@ impl Belief {
         }
     }
 
-    /// Both, where each knows its own episode: the product of the likelihoods under one prior.
+    /// Combined belief from two independent episodes: the product of the likelihoods under one
+    /// prior.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         match (self, other) {
@@ -114,7 +118,8 @@ impl Belief {
         }
     }
 
-    /// With its deviation (or the temperature of its odds) multiplied.
+    /// The belief with its standard deviation (or the temperature of its log-odds) multiplied by
+    /// `factor`.
     #[must_use]
     pub fn widened(self, factor: f64) -> Self {
         match self {

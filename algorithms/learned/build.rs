@@ -1,4 +1,4 @@
-//! Embeds what ships trained: every file of `algorithms/trained/TASK/NAME.safetensors`.
+//! Embeds the trained networks that ship: every file of `algorithms/trained/TASK/NAME.safetensors`.
 
 // A build script speaks to cargo through its standard output.
 #![allow(clippy::print_stdout)]

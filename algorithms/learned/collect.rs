@@ -1,4 +1,5 @@
-//! Episodes of an explorer at truths of the prior: what an estimator learns from.
+//! Collects episodes of an explorer at truths drawn from the prior: the training data of an
+//! estimator.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -9,18 +10,18 @@ use asid_core::{Error, Explorer, Problem, Result};
 use crate::episodes::EpisodeBatch;
 use crate::history::History;
 
-/// Histories with the truths behind them.
+/// Episode histories with their true values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dataset {
-    /// `n x len`.
+    /// Histories, `n x len`.
     pub histories: Vec<f64>,
-    /// Prior-scaled, `n x unknowns`.
+    /// Truths, prior-scaled, `n x unknowns`.
     pub truths: Vec<f64>,
-    /// Numbers of a history.
+    /// Numbers per history.
     pub len: usize,
-    /// Numbers of a history that are entries; the rest are masks.
+    /// Numbers per history that are entries; the rest are masks.
     pub entries: usize,
-    /// Marks of a history; entries and masks of a mark stand together.
+    /// Marks per history; the entries of one mark are contiguous, and so are its masks.
     pub marks: usize,
 }
 
@@ -48,11 +49,13 @@ impl Dataset {
     }
 }
 
-/// Plays `episodes` episodes of an explorer, each with chance of its own, over the problem's
-/// threads. Episodes that diverged are left out.
+/// Plays `episodes` episodes of an explorer over the problem's threads, each with its own random
+/// stream.
+///
+/// Episodes that diverged are left out.
 ///
 /// # Errors
-/// When the explorer or the engine fails, or fewer than half of the episodes last.
+/// When the explorer or the engine fails, or more than half of the episodes diverge.
 pub fn collect(problem: &Problem<'_>, explorer: &dyn Explorer, episodes: usize) -> Result<Dataset> {
     let history = History::new(problem)?;
     let threads = match problem.threads {
@@ -78,7 +81,7 @@ pub fn collect(problem: &Problem<'_>, explorer: &dyn Explorer, episodes: usize) 
             }
             let row = one(&own, explorer, &history, &mut batch, i);
             if row.is_err() {
-                // The others need not go on.
+                // Stops the other threads as well.
                 next.store(episodes, Ordering::Relaxed);
             }
             let row = row?;
@@ -123,7 +126,7 @@ pub fn collect(problem: &Problem<'_>, explorer: &dyn Explorer, episodes: usize) 
 /// History and prior-scaled truth of an episode.
 type Row = (Vec<f64>, Vec<f64>);
 
-/// Episode `i`; none where it diverged.
+/// Plays episode `i`; `None` where it diverged.
 fn one(
     problem: &Problem<'_>,
     explorer: &dyn Explorer,
@@ -181,9 +184,9 @@ mod tests {
             });
         }
         assert_eq!(found[0].episodes(), 5);
-        // NaN is nowhere: nothing is missing in a simulation.
+        // NaN never occurs: a simulation has no missing readings.
         assert_eq!(found[0], found[1]);
-        // Every episode has a truth, a start and actions of its own.
+        // Every episode has its own truth, start and actions.
         let rows: Vec<&[f64]> = found[0].histories.chunks_exact(found[0].len).collect();
         assert!(rows[0][0] != rows[1][0] && found[0].truths[0] != found[0].truths[1]);
         assert!(rows[0][45..] != rows[1][45..]);

@@ -1,5 +1,5 @@
-//! A batch of exploration episodes as trackers see them: readings with noise, one simulation an
-//! episode, and nothing but the readings.
+//! A batch of exploration episodes as trackers see them: noisy readings, one simulation per
+//! episode, and no copies.
 
 use std::sync::atomic::Ordering;
 
@@ -13,7 +13,7 @@ use asid_readings::SignalSet;
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Episodes that step together.
+/// Episodes that step in lockstep.
 pub struct EpisodeBatch<'a> {
     problem: &'a Problem<'a>,
     batch: Batch,
@@ -34,7 +34,8 @@ pub struct EpisodeBatch<'a> {
 }
 
 impl<'a> EpisodeBatch<'a> {
-    /// `episodes` at once; truths, start poses and noise are drawn from `rng`.
+    /// Prepares `episodes` simultaneous episodes; truths, start poses and noise are drawn from
+    /// `rng`.
     ///
     /// # Errors
     /// When the engine cannot set an unknown.
@@ -69,7 +70,7 @@ impl<'a> EpisodeBatch<'a> {
         self.sims.len()
     }
 
-    /// Entries of a reading's row.
+    /// Number of entries of a reading's row.
     #[must_use]
     pub fn width(&self) -> usize {
         self.recording.width()
@@ -81,7 +82,7 @@ impl<'a> EpisodeBatch<'a> {
         self.step
     }
 
-    /// Share of the episodes that is over.
+    /// Elapsed share of the episodes, from 0 to 1.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.step as f64 / self.problem.task.exploration().horizon as f64
@@ -100,19 +101,19 @@ impl<'a> EpisodeBatch<'a> {
         &self.latest[episode * width..][..width]
     }
 
-    /// The frames of an episode's latest control step, `frames x width`, with noise.
+    /// Frames of an episode's latest control step, `frames x width`, with noise.
     #[must_use]
     pub fn frames(&self, episode: usize) -> &[f64] {
         let len = self.frames_per_step * self.width();
         &self.frames[episode * len..][..len]
     }
 
-    /// Goes on with another generator, such as one of the next episode's own.
+    /// Continues with another random generator, such as that of the next episode.
     pub fn reseed(&mut self, rng: Rng) {
         self.rng = rng;
     }
 
-    /// Begins new episodes at truths of the prior and start poses of the protocol.
+    /// Begins new episodes at truths drawn from the prior and start poses of the protocol.
     ///
     /// # Errors
     /// When the engine fails.
@@ -144,10 +145,11 @@ impl<'a> EpisodeBatch<'a> {
         read
     }
 
-    /// One control step: actions `episodes x action`, in the task's units.
+    /// Takes one control step with `actions` (`episodes x action`, in the task's units).
     ///
     /// # Errors
-    /// When the engine fails as a whole; the readings of an episode that diverged are not finite.
+    /// When the engine fails as a whole. A single episode that diverges only gives readings that
+    /// are not finite.
     pub fn step(&mut self, actions: &[f64]) -> Result<()> {
         let a = self.problem.task.exploration().action.len();
         let block = self.control.len() / self.episodes();
@@ -191,7 +193,7 @@ impl<'a> EpisodeBatch<'a> {
         let (width, tracked) = (self.width(), self.signals.width());
         let Self { signals, rng, .. } = self;
         for row in rows.chunks_exact_mut(width) {
-            // A row that is not finite stays so, whatever is added.
+            // A row that is not finite needs no noise.
             if row.iter().all(|x| x.is_finite()) {
                 signals.add_noise(&mut row[..tracked], || StandardNormal.sample(rng));
             }

@@ -1,10 +1,11 @@
-//! Identification by a learned estimator: a network that was shown many episodes of one explorer,
-//! each with its truth, says what an episode tells (Kumar et al. 2019; "ASID + estimator" of the
-//! paper). It simulates nothing when it is asked, and knows nothing of episodes unlike those that
-//! it was shown.
+//! Identification by a learned estimator: a network that maps an episode to a posterior (Kumar et
+//! al. 2019; "ASID + estimator" of the paper).
 //!
-//! The network gives a Gaussian in prior-scaled coordinates, cut to the prior's box, for each
-//! unknown ([`crate::inference`]); its deviations are calibrated on held-out episodes.
+//! The network is trained on many episodes of one explorer with known truths. Evaluating it needs
+//! no simulation. It is not reliable on episodes unlike those of its training.
+//!
+//! For each unknown the network gives a Gaussian in prior-scaled coordinates, truncated to the
+//! prior's box ([`crate::inference`]). Its standard deviations are calibrated on held-out episodes.
 
 mod training;
 
@@ -37,32 +38,32 @@ const NETWORK: &str = "estimator";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Estimator {
-    /// File of a trained network; empty for what ships for the task and the explorer, else trained
-    /// on the spot; `train` to train; `shipped` for what ships alone.
+    /// File of a trained network. Empty: the one that ships for the task and the explorer, else
+    /// trained on the spot. `train`: train anew. `shipped`: only the one that ships.
     pub network: String,
-    /// The explorer whose episodes are learned from; estimators of one explorer's episodes know
-    /// nothing of another's.
+    /// The explorer whose episodes the estimator learns from; it is not valid for episodes of
+    /// another explorer.
     pub explorer: String,
-    /// Episodes to learn from, held-out ones included.
+    /// Episodes to learn from, including the held-out ones.
     pub episodes: usize,
-    /// Share of the episodes that calibrates, and share that is scored: 0.1 is 10 % for each.
+    /// Share of the episodes for calibration, and the same share for scoring: 0.1 is 10 % for each.
     pub held_out: f64,
     /// Units of the hidden layers (tanh).
     pub hidden: Vec<usize>,
-    /// Passes over the episodes. The best on the calibrating episodes is kept.
+    /// Passes over the episodes; the epoch that is best on the calibration episodes is kept.
     pub epochs: usize,
-    /// Episodes of a step of Adam.
+    /// Episodes per step of Adam.
     pub minibatch: usize,
     /// Step size of Adam.
     pub learning_rate: f64,
-    /// Decoupled decay of weights a step, relative to the step size (Loshchilov and Hutter 2019).
+    /// Decoupled weight decay per step, relative to the step size (Loshchilov and Hutter 2019).
     pub weight_decay: f64,
-    /// Share of the readings that are left out at random while it learns, so that it is not
-    /// surprised by a tracker that loses the object.
+    /// Share of the readings that are dropped at random in training, so that the network can handle
+    /// a tracker that loses the object.
     pub missing: f64,
-    /// Samples of the posterior.
+    /// Number of posterior samples.
     pub samples: usize,
-    /// What was trained on the spot; no setting.
+    /// Network that was trained on the spot; not a setting.
     #[serde(skip)]
     pub cache: Cache,
 }
@@ -98,7 +99,7 @@ asid_core::register!(IdentifierEntry {
     },
 });
 
-/// Name under which an estimator of an explorer's episodes ships.
+/// Name under which the estimator for an explorer's episodes ships.
 #[must_use]
 pub fn shipped_name(explorer: &str) -> String {
     format!("{NAME}-{explorer}")
@@ -136,7 +137,7 @@ impl Estimator {
         require("identifier", &rules)
     }
 
-    /// What the network takes, as a file says it.
+    /// The inputs of the network, as a file describes them.
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
         let history = History::new(problem)?;
         Ok(vec![
@@ -151,7 +152,7 @@ impl Estimator {
         ])
     }
 
-    /// What keeps a file from being used.
+    /// Why a file cannot be used, if it cannot.
     fn misfit(&self, problem: &Problem<'_>, saved: &Saved) -> Result<Option<String>> {
         let observation = self.observation(problem)?;
         let d = &saved.description;
@@ -172,7 +173,7 @@ impl Estimator {
         Ok(None)
     }
 
-    /// The network from a file, from the program, or trained here and now.
+    /// The network: from a file, from the program, or trained now.
     fn obtain(&self, problem: &Problem<'_>) -> Result<Arc<Saved>> {
         if is_file(&self.network) {
             let saved = Saved::load(Path::new(&self.network))?;
@@ -224,7 +225,7 @@ impl Estimator {
     }
 }
 
-/// Settings over defaults, one level deep.
+/// Merges settings over defaults, one level deep.
 fn merged(mut defaults: Settings, over: Settings) -> Settings {
     defaults.extend(over);
     defaults
@@ -277,8 +278,10 @@ impl Identifier for Estimator {
     }
 }
 
-/// Start pose of each episode as its first complete reading shows it, and the root mean square of
-/// the whitened residual of a replay at the means: the estimator itself has no residual.
+/// Start pose of each episode as its first complete reading shows it, and the residual of a replay.
+///
+/// The residual is the root mean square of the whitened residual at the means: the estimator itself
+/// has none.
 fn replayed(
     problem: &Problem<'_>,
     episodes: &[Episode],
@@ -317,7 +320,7 @@ mod tests {
     use crate::network::{Layer, Network};
     use crate::testing::with_problem;
 
-    /// A network for rod balancing that gives `outputs` whatever it is shown.
+    /// A network for rod balancing with constant `outputs`.
     fn constant(problem: &Problem<'_>, outputs: [f32; 2]) -> Saved {
         let estimator = Estimator::default();
         let history = History::new(problem).unwrap();
@@ -358,8 +361,9 @@ mod tests {
         world.explore(&mut *explored.policy).unwrap().episode
     }
 
-    /// Outputs 0 and 0 are the mean 0 and the deviation 1: in the cut Gaussian 95 % lie within
-    /// 1.516 of 0 (Phi(1.516) - 1/2 = 0.95 (Phi(b) - 1/2)); the prior has 1.645.
+    /// Outputs 0 and 0 mean a mean of 0 and a standard deviation of 1. In the truncated Gaussian 95
+    /// % lie within 1.516 of 0 (Phi(1.516) - 1/2 = 0.95 (Phi(b) - 1/2)); for the prior this is
+    /// 1.645.
     #[test]
     fn a_file_gives_a_posterior_without_a_library_of_networks() {
         let folder = tempfile::tempdir().unwrap();
@@ -373,7 +377,7 @@ mod tests {
                 ..Estimator::default()
             };
             let mut log = episode(problem);
-            // Readings may be missing; the first complete row says where the rod began.
+            // Readings may be missing; the first complete row gives the start pose of the rod.
             let width = log.width();
             log.readings[3 * width..5 * width].fill(f64::NAN);
             let found = estimator.identify(problem, &[log]).unwrap();

@@ -1,9 +1,8 @@
-//! Files of what was trained: safetensors, with the description of how it came about.
+//! Files of trained networks: safetensors with a description of the training.
 //!
-//! The format is a JSON header and raw numbers, so that a file can be read by other programs and
-//! runs nothing when it is loaded. The description is one JSON text under the key `asid` of the
-//! header's metadata: one key, because metadata has no order and the same training is to give the
-//! same bytes.
+//! The format is a JSON header and raw numbers. Other programs can read it, and loading it executes
+//! no code. The description is one JSON text under the key `asid` of the header's metadata. It is a
+//! single key because metadata has no order, and equal trainings must give equal bytes.
 
 mod description;
 
@@ -18,7 +17,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use description::SCHEMA;
 pub use description::{ActionEntry, Description, ObservationEntry};
 
-/// Numbers of some shape, row-major, single precision.
+/// A tensor: numbers of some shape, row-major, single precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
     /// Lengths of the dimensions.
@@ -28,7 +27,7 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// Of one dimension.
+    /// A tensor of one dimension.
     #[must_use]
     pub fn vector(values: Vec<f32>) -> Self {
         Self {
@@ -44,12 +43,12 @@ pub type Tensors = BTreeMap<String, Tensor>;
 /// Key of the description in the metadata.
 const KEY: &str = "asid";
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Saved {
-    /// How it came about.
+    /// Description of the training.
     pub description: Description,
-    /// The numbers.
+    /// The trained numbers.
     pub tensors: Tensors,
 }
 
@@ -57,7 +56,7 @@ impl Saved {
     /// The file's bytes; the same numbers and description give the same bytes.
     ///
     /// # Errors
-    /// [`Error::Shape`] where a tensor has not the numbers that its shape asks for.
+    /// [`Error::Shape`] where a tensor has a different number of values than its shape requires.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let raw: Vec<(&String, &[usize], Vec<u8>)> = self
             .tensors
@@ -80,10 +79,10 @@ impl Saved {
             .map_err(|e| Error::Shape(format!("safetensors: {e}")))
     }
 
-    /// Reads a file's bytes; the message says what is wrong with them.
+    /// Parses a file's bytes; an error says what is wrong with them.
     ///
     /// # Errors
-    /// Where they are no safetensors of this program.
+    /// Where they are no safetensors file of this program.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         let wrong = |e: &dyn std::fmt::Display| format!("is no safetensors file: {e}");
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| wrong(&e))?;
@@ -120,7 +119,7 @@ impl Saved {
         })
     }
 
-    /// Writes the file: whole, or not at all.
+    /// Writes the file atomically.
     ///
     /// # Errors
     /// [`Error::File`] where it cannot be written.
@@ -131,7 +130,7 @@ impl Saved {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::File`] where it cannot be read or is none of this program.
+    /// [`Error::File`] where it cannot be read or is no file of this program.
     pub fn load(path: &Path) -> Result<Self> {
         let wrong = |message: String| Error::File {
             path: path.to_owned(),
@@ -142,7 +141,7 @@ impl Saved {
     }
 }
 
-/// Writes a file beside its place and gives it its name when it is whole.
+/// Writes a file atomically: to a temporary file beside it, which is then renamed.
 ///
 /// # Errors
 /// [`Error::File`] where that fails.
@@ -201,7 +200,7 @@ mod tests {
         for _ in 0..4 {
             assert_eq!(saved().to_bytes().unwrap(), bytes);
         }
-        // Nothing is left beside it.
+        // No temporary file is left.
         let names = fs::read_dir(path.parent().unwrap()).unwrap().count();
         assert_eq!(names, 1);
     }

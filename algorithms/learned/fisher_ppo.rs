@@ -1,14 +1,14 @@
-//! The Fisher objective with PPO: a policy that reacts to what it sees.
+//! The Fisher objective with PPO: a closed-loop exploration policy.
 //!
-//! The reward of a step is what it adds to the information about the unknowns,
-//! [`Information::reward`](asid_algorithms::fisher::Information::reward). It comes by way of
-//! [`FisherEnvironment`](asid_algorithms::explore::FisherEnvironment), in which the crate `asid-nn` trains.
+//! The reward of a step is the information about the unknowns that it adds,
+//! [`Information::reward`](asid_algorithms::fisher::Information::reward).
+//! [`FisherEnvironment`](asid_algorithms::explore::FisherEnvironment) computes it; the crate
+//! `asid-nn` trains in that environment.
 //!
-//! It is trained once, over start poses and unknowns drawn anew for every episode
-//! (domain randomisation), and then plays any episode without a search. In the real
-//! world the information gathered so far, part of its observation, is that of a
-//! simulation at the middle of the prior which starts where the first reading shows
-//! the object and takes the same actions.
+//! The policy is trained once, over start poses and unknowns drawn anew for every episode (domain
+//! randomisation). It then plays any episode without a search. The information gathered so far is
+//! part of its observation. In the real world it comes from a simulation at the middle of the
+//! prior, which starts at the object pose of the first reading and takes the same actions.
 
 use std::sync::Arc;
 
@@ -30,19 +30,19 @@ use crate::ppo_settings::PpoConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherPpo {
-    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
-    /// `shipped` for what ships alone.
+    /// File of a trained policy. Empty: the one that ships, else trained on the spot. `train`:
+    /// train anew. `shipped`: only the one that ships.
     pub policy: String,
     /// Episodes that are simulated at once.
     pub environments: usize,
-    /// The learner. Discount 1 and a constant scale of rewards keep the return equal
-    /// to the information gained.
+    /// The learner. Discount 1 and a constant reward scale keep the return equal to the information
+    /// gained.
     pub ppo: PpoConfig,
-    /// What is rewarded: by default `d-optimal`, which unlike `a-optimal` still tells a
-    /// good episode from a better one, with a start pose that is known, which needs fewer
-    /// copies (3 instead of 9 on rod balancing).
+    /// The objective. The default `d-optimal` does not saturate, unlike `a-optimal`, and still
+    /// distinguishes good episodes from better ones. The start pose counts as known, which needs
+    /// fewer copies (3 instead of 9 on rod balancing).
     pub fisher: FisherSettings,
-    /// What was trained on the spot; no setting.
+    /// Policy that was trained on the spot; not a setting.
     #[serde(skip)]
     pub cache: Cache,
 }
@@ -52,7 +52,7 @@ impl Default for FisherPpo {
         Self {
             policy: String::new(),
             environments: 64,
-            // One episode of each environment an update.
+            // Each update takes one episode of each environment.
             ppo: PpoConfig {
                 total_steps: 200_000,
                 n_steps: 1280,
@@ -79,7 +79,7 @@ learned_explorer!(
     "Fisher information, a policy trained by proximal policy optimisation"
 );
 
-/// Checks a number of environments.
+/// Checks that there is at least one environment.
 pub(crate) fn check_environments(environments: usize) -> Result<()> {
     require(
         "explorer",
@@ -87,7 +87,7 @@ pub(crate) fn check_environments(environments: usize) -> Result<()> {
     )
 }
 
-/// The entries of an observer as a file names them.
+/// The entries of an observer, as a file describes them.
 #[must_use]
 pub fn entries(observer: &Observer) -> Vec<ObservationEntry> {
     let entry = |e: &asid_algorithms::explore::observation::Entry| ObservationEntry {
@@ -128,17 +128,17 @@ impl LearnedExplorer for FisherPpo {
     }
 }
 
-/// Readings, with the information that a simulation which runs along has gathered.
+/// Observes readings together with the information gathered by a simulation that runs along.
 pub struct Shadowed<'a> {
     problem: &'a Problem<'a>,
     observer: Observer,
-    /// The episode as it would be in the middle of the prior.
+    /// The episode simulated at the middle of the prior.
     shadow: FisherBatch<'a>,
     reading: Vec<f64>,
 }
 
 impl<'a> Shadowed<'a> {
-    /// For a policy that was trained with these settings.
+    /// Observer for a policy that was trained with these settings.
     ///
     /// # Errors
     /// As [`FisherBatch::new`].
@@ -186,7 +186,7 @@ mod tests {
     use crate::policy::Policy;
     use crate::testing::with_problem;
 
-    /// A file with this policy for a problem.
+    /// A file that holds this policy for a problem.
     fn saved(problem: &Problem<'_>, network: &Policy) -> Saved {
         let mut tensors = Tensors::new();
         network.to_tensors(POLICY, &mut tensors);
@@ -200,7 +200,8 @@ mod tests {
         }
     }
 
-    /// The last entry of the observation, the information gathered, moves the hand along x.
+    /// A policy in which the observation's last entry, the information gathered, moves the hand
+    /// along x.
     fn by_information(problem: &Problem<'_>) -> Policy {
         let inputs = Observer::new(problem).unwrap().observation_len();
         let mut weight = vec![0.0; inputs * 2];
@@ -208,8 +209,8 @@ mod tests {
         Policy::linear(inputs, weight, vec![0.0; 2])
     }
 
-    /// The information gathered so far is an entry of the observation: with other
-    /// readings equal, a policy that looks at nothing else acts by it.
+    /// The information gathered so far is an entry of the observation: a policy that uses only this
+    /// entry acts by it.
     #[test]
     fn a_policy_acts_by_the_information_gathered() {
         with_problem("rod-balancing", |problem| {
@@ -241,7 +242,7 @@ mod tests {
         });
     }
 
-    /// A file is all that is needed: no library of networks is linked here.
+    /// A saved policy needs only its file: no neural-network library is linked here.
     #[test]
     fn a_saved_policy_is_played_from_its_file() {
         let folder = tempfile::tempdir().unwrap();
@@ -273,7 +274,7 @@ mod tests {
             )
             .unwrap();
             let first = world.explore(&mut *explored.policy).unwrap();
-            // A policy can be played again: the second episode is the first.
+            // A policy can be replayed: the second episode equals the first.
             let second = world.explore(&mut *explored.policy).unwrap();
             assert_eq!(first.actions, second.actions);
             assert_eq!(first.actions.len(), 20 * 2);
@@ -341,7 +342,7 @@ mod tests {
         assert!(message("environments = 0").contains("explorer.environments"));
         assert!(message("[ppo]\nclip = 0.0").contains("ppo.clip"));
         assert!(message("[fisher]\ndelta = -1.0").contains("delta"));
-        // What a user sets is put over the explorer's own defaults, not the learner's.
+        // A user's settings override the explorer's own defaults, not the learner's.
         let defaults = (find::<ExplorerEntry>("fisher-ppo").unwrap().defaults)();
         assert_eq!(defaults["ppo"]["gamma"].as_float(), Some(1.0));
     }

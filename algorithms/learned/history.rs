@@ -1,25 +1,28 @@
-//! An episode so far, as numbers of a fixed length for a network.
+//! History of an episode as a fixed number of values, the input of a network.
 //!
-//! The episode is cut at *marks*, the ends of its control steps and its start. Each mark has the
-//! place and the orientation of every tracked part, the end effector, and where it is seen from
-//! each part; the first reading of place, orientation and effector stands as it is, later ones as
-//! what has changed since. An object that was moved a centimetre tells of its physics, the decimetres
-//! between start poses do not, and inputs that are scaled by the latter would hide it. What is missing or still to come is NaN and has a mask of 0, so that one network
-//! takes episodes at any time and with any reading left out.
+//! The episode is sampled at *marks*: its start and the ends of its control steps. The entries of a
+//! mark are position and orientation of every tracked part, the position of the end effector, and
+//! that position relative to each part. The first reading of position, orientation and effector is
+//! taken as it is; later ones are differences from it. The reason is scale: a displacement of a
+//! centimetre is informative about the object's physics, but the decimetres between start poses
+//! would dominate it.
+//!
+//! Missing and future values are NaN and have a mask of 0. One network thus handles episodes of any
+//! length with any reading missing.
 
 use asid_core::layout::Recording;
 use asid_core::nalgebra::{Matrix3, Vector3};
 use asid_core::signal::unit_quaternion;
 use asid_core::{Episode, Problem, Result};
 
-/// How entries of a mark come out of a reading's row.
+/// How the entries of a mark are computed from a reading's row.
 #[derive(Clone, Debug)]
 enum Part {
-    /// As they are, from this entry on, so many.
+    /// Copied: first entry and number of entries.
     Plain(usize, usize),
-    /// Two columns of the rotation of the quaternion at this entry.
+    /// Two columns of the rotation matrix of the quaternion that begins at this entry.
     Rotation(usize),
-    /// The end effector at the first entry, less the place at the second.
+    /// Position of the end effector (first entry) minus the position of a part (second entry).
     Relative(usize, usize),
 }
 
@@ -53,24 +56,25 @@ impl Part {
     }
 }
 
-/// How episodes of a problem become numbers: entries of all marks, then masks of all marks.
+/// Converts episodes of a problem to numbers: the entries of all marks, then the masks of all
+/// marks.
 #[derive(Clone, Debug)]
 pub struct History {
     parts: Vec<Part>,
-    /// Where each tracked signal begins in a reading's row.
+    /// First entry of each tracked signal in a reading's row.
     tracked: Vec<usize>,
-    /// Entries of a mark.
+    /// Number of entries per mark.
     entries: usize,
     marks: usize,
     /// Channels of a reading's row, in order.
     channels: Vec<String>,
     width: usize,
-    /// Time from mark to mark, s.
+    /// Time between marks, s.
     period: f64,
 }
 
 impl History {
-    /// The history of a problem's exploration episodes.
+    /// History layout of a problem's exploration episodes.
     ///
     /// # Errors
     /// When the scene lacks a channel of the protocol.
@@ -106,37 +110,37 @@ impl History {
         })
     }
 
-    /// Entries of all marks, without the masks.
+    /// Number of entries of all marks, without the masks.
     #[must_use]
     pub fn entries(&self) -> usize {
         self.marks * self.entries
     }
 
-    /// Masks of all marks.
+    /// Number of masks of all marks.
     #[must_use]
     pub fn masks(&self) -> usize {
         self.marks * self.tracked.len()
     }
 
-    /// Numbers of a history.
+    /// Number of values of a history.
     #[must_use]
     pub fn len(&self) -> usize {
         self.entries() + self.masks()
     }
 
-    /// A history has at least the entries of its first mark.
+    /// Never true: a history has at least the entries of its first mark.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Marks of an episode.
+    /// Number of marks of an episode.
     #[must_use]
     pub fn marks(&self) -> usize {
         self.marks
     }
 
-    /// The history of which nothing is known yet.
+    /// An empty history: all entries unknown.
     #[must_use]
     pub fn blank(&self) -> Vec<f64> {
         let mut out = vec![f64::NAN; self.entries()];
@@ -144,8 +148,9 @@ impl History {
         out
     }
 
-    /// Writes the entries of a mark: the mean over the rows (`n x width`, NaN where a reading is
-    /// missing) of each entry, over those rows that have it.
+    /// Writes the entries of a mark: the mean of each entry over the rows that have it.
+    ///
+    /// The rows are `n x width`, NaN where a reading is missing.
     pub fn write(&self, history: &mut [f64], mark: usize, rows: &[f64]) {
         let mut sum = vec![0.0; self.entries];
         let mut count = vec![0.0_f64; self.entries];
@@ -178,7 +183,7 @@ impl History {
         history[masks..masks + seen.len()].copy_from_slice(&seen);
     }
 
-    /// Makes the entries of a mark what has changed since the first mark that has them.
+    /// Replaces the entries of a mark by differences from the first mark that has them.
     fn subtract_first(&self, history: &mut [f64], mark: usize) {
         let (before, from) = history.split_at_mut(mark * self.entries);
         let mut at = 0;
@@ -194,9 +199,11 @@ impl History {
         self.turn(history, mark);
     }
 
-    /// Turns what has changed, and where the effector is seen from, into the frame of the first
-    /// orientation of the first part: what an object does when it is pushed does not depend on how
-    /// it lies. Without a first orientation the frame is the world's.
+    /// Rotates differences and relative positions into the frame of the first part's first
+    /// orientation.
+    ///
+    /// The response of an object to a push does not depend on how it lies. Without a first
+    /// orientation the frame is the world's.
     fn turn(&self, history: &mut [f64], mark: usize) {
         let starts = self.parts.iter().scan(0, |at, part| {
             let start = *at;
@@ -225,18 +232,21 @@ impl History {
         }
     }
 
-    /// Makes the marks from `from` on unknown again.
+    /// Resets the marks from `from` on to unknown.
     pub fn forget(&self, history: &mut [f64], from: usize) {
         let (entries, masks) = history.split_at_mut(self.entries());
         entries[from * self.entries..].fill(f64::NAN);
         masks[from * self.tracked.len()..].fill(0.0);
     }
 
-    /// The history of a log, at any rate: a row belongs to the first mark that is not before it.
-    /// Channels that are not in the log are missing, rows past the last mark are left out.
+    /// The history of a log at any sampling rate.
+    ///
+    /// Each row belongs to the first mark that is not before it. Channels that the log lacks are
+    /// missing; rows after the last mark are left out.
     #[must_use]
     pub fn of_episode(&self, problem: &Problem<'_>, episode: &Episode) -> Vec<f64> {
-        /// A row this share of a period after a mark still belongs to it.
+        /// A row this share of a period after a mark still belongs to that mark, against rounding
+        /// of the times.
         const SLACK: f64 = 1e-6;
         let readings = episode.select(problem.model.layout(), &self.channels);
         let mut rows: Vec<Vec<f64>> = vec![Vec::new(); self.marks];
@@ -261,7 +271,8 @@ mod tests {
     use super::*;
     use crate::testing::with_problem;
 
-    /// Rod: place (3), effector from it (3), rotation (6), effector (3); two tracked signals.
+    /// Rod: position (3), effector relative to it (3), rotation (6), effector (3); two tracked
+    /// signals.
     #[test]
     fn marks_hold_means_of_what_is_there() {
         with_problem("rod-balancing", |problem| {
@@ -283,7 +294,7 @@ mod tests {
             assert!(numbers[..15].iter().all(|x| x.is_nan()));
             let masks = &numbers[history.entries()..];
             assert_eq!(masks[..5], [0.0, 0.0, 1.0, 1.0, 0.0]);
-            // The next one holds what has changed, except for where the effector is seen from.
+            // The next mark holds differences, except for the relative position of the effector.
             let mut later = row.clone();
             later[0] += 0.15;
             history.write(&mut numbers, 2, &later);
@@ -296,8 +307,8 @@ mod tests {
         });
     }
 
-    /// An episode that is turned about the vertical, its object and its hand alike, has the same
-    /// history after its first mark.
+    /// An episode rotated about the vertical, object and hand alike, has the same history after its
+    /// first mark.
     #[test]
     fn a_turned_episode_tells_the_same() {
         with_problem("rod-balancing", |problem| {

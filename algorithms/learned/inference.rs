@@ -1,16 +1,17 @@
-//! A learned posterior: a network that takes the history of an episode and gives, for each
-//! unknown, a Gaussian in prior-scaled coordinates, or the probability of a binary one.
+//! A learned posterior: a network that maps the history of an episode to a belief about each
+//! unknown.
 //!
-//! The Gaussian is cut to the prior's box `[-b, b]`, as the posterior under a uniform prior is:
+//! The belief is a Gaussian in prior-scaled coordinates, or the log-odds of a binary unknown. The
+//! Gaussian is truncated to the prior's box `[-b, b]`, like a posterior under a uniform prior:
 //!
 //! ```text
-//! q(z) = N(z; m, s^2) / (Phi((b - m) / s) - Phi((-b - m) / s)),   -b <= z <= b
-//! m    = b tanh(o_1),   log s = LOW + (HIGH - LOW) sigmoid(o_2 + OFFSET)
+//! q(z) = N(z; m, s^2) / (Phi((b - m) / s) - Phi((-b - m) / s)),   -b <= z <= b m  = b tanh(o_1),
+//! log s = LOW + (HIGH - LOW) sigmoid(o_2 + OFFSET)
 //! ```
 //!
-//! With a large `s` it is the prior itself, so that a network that has learned nothing claims
-//! nothing. Its logarithm less that of the prior, averaged over episodes, is a lower bound of the
-//! information that the episode has on the unknown (Barber and Agakov 2003).
+//! With a large `s` it equals the prior, so a network that has learned nothing claims nothing. The
+//! mean of `log q - log prior` over episodes is a lower bound of the information of the episode
+//! about the unknown (Barber and Agakov 2003).
 
 use std::f64::consts::LN_10;
 
@@ -20,35 +21,35 @@ use crate::belief::Belief;
 use crate::file::{Tensor, Tensors};
 use crate::network::{Layer, Network};
 
-/// Smallest and largest logarithm of the deviation, prior-scaled: 0.001 and 10.
+/// Smallest and largest logarithm of the standard deviation, prior-scaled: 0.001 and 10.
 pub const LOG_STD: [f64; 2] = [-3.0 * LN_10, LN_10];
 
-/// Added to the second output, so that an untrained network has a deviation of 1.
+/// Offset of the second output: an untrained network then has a standard deviation of 1.
 pub const OFFSET: f64 = 1.098_612_288_668_109_8;
 
-/// Scaled entries are clipped to plus and minus this many deviations.
+/// Scaled entries are clipped to plus and minus this many standard deviations.
 const CLIP: f64 = 10.0;
 
-/// An entry that varies by less than this is a constant, in its unit.
+/// An entry that varies by less than this, in its unit, is treated as constant.
 const CONSTANT: f64 = 1e-9;
 
-/// The network with the scales of its inputs and the calibration of its outputs.
+/// The network with the scaling of its inputs and the calibration of its outputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inference {
-    /// Mean of each entry of a history; masks have none.
+    /// Mean of each entry of a history; masks are not scaled.
     mean: Vec<f32>,
-    /// Its standard deviation.
+    /// Standard deviation of each entry.
     std: Vec<f32>,
-    /// Takes scaled entries and masks, gives two numbers an unknown.
+    /// The network; it takes scaled entries and masks and gives two numbers per unknown.
     network: Network,
-    /// Factor on the deviation of each unknown (temperature of a binary one).
+    /// Factor on the standard deviation of each unknown (temperature for a binary one).
     calibration: Vec<f32>,
     /// Which unknowns are binary.
     binary: Vec<bool>,
 }
 
 impl Inference {
-    /// Mean and deviation of each of the first `entries` numbers of histories, `n x len`.
+    /// Mean and standard deviation of each of the first `entries` numbers of histories, `n x len`.
     #[must_use]
     pub fn scales(histories: &[f64], len: usize, entries: usize) -> (Vec<f32>, Vec<f32>) {
         let mut moments = (Vec::with_capacity(entries), Vec::with_capacity(entries));
@@ -66,7 +67,7 @@ impl Inference {
         moments
     }
 
-    /// Of a trained network.
+    /// Wraps a trained network.
     #[must_use]
     pub fn new(
         (mean, std): (Vec<f32>, Vec<f32>),
@@ -82,19 +83,19 @@ impl Inference {
         }
     }
 
-    /// What the network takes of a history: entries scaled, 0 where missing, and the masks.
+    /// Writes the network's inputs for a history: scaled entries, 0 where missing, then the masks.
     pub fn input(&self, history: &[f64], out: &mut Vec<f32>) {
         out.clear();
         scale((&self.mean, &self.std), history, out);
     }
 
-    /// Numbers that the network takes.
+    /// Number of inputs of the network.
     #[must_use]
     pub fn inputs(&self) -> usize {
         self.network.inputs()
     }
 
-    /// What a history tells of each unknown.
+    /// Belief about each unknown after a history.
     #[must_use]
     pub fn beliefs(&self, history: &[f64]) -> Vec<Belief> {
         let mut input = Vec::with_capacity(self.inputs());
@@ -108,8 +109,10 @@ impl Inference {
             .collect()
     }
 
-    /// Chooses the factor of each unknown's deviation that makes held-out truths most likely:
-    /// `histories` is `n x len`, `truths` are prior-scaled, `n x unknowns`.
+    /// Chooses the factor on each unknown's standard deviation that maximises the likelihood of
+    /// held-out truths.
+    ///
+    /// `histories` is `n x len`; `truths` are prior-scaled, `n x unknowns`.
     pub fn calibrate(&mut self, histories: &[f64], len: usize, truths: &[f64]) {
         /// Factors that are tried: `exp(k / 20)`, from 0.14 to 7.4.
         const TRIES: std::ops::RangeInclusive<i32> = -40..=40;
@@ -133,7 +136,7 @@ impl Inference {
         }
     }
 
-    /// The network and its scales as tensors, their names beginning with `prefix`.
+    /// The network and its scales as tensors, with names that begin with `prefix`.
     pub fn to_tensors(&self, prefix: &str, tensors: &mut Tensors) {
         let named = [
             ("mean", self.mean.clone()),
@@ -155,7 +158,7 @@ impl Inference {
         }
     }
 
-    /// What a file holds under `prefix`; the message says what is wrong.
+    /// Reads the network stored under `prefix`; an error says what is wrong.
     ///
     /// # Errors
     /// Where tensors are missing or do not fit histories of this shape or these unknowns.
@@ -200,7 +203,7 @@ impl Inference {
     }
 }
 
-/// What a network takes of a history, given the scales of its entries.
+/// Appends the network inputs for a history, with these scales of its entries.
 pub fn scale((mean, std): (&[f32], &[f32]), history: &[f64], out: &mut Vec<f32>) {
     let (entries, masks) = history.split_at(mean.len());
     for ((x, mean), std) in entries.iter().zip(mean).zip(std) {
@@ -214,7 +217,7 @@ pub fn scale((mean, std): (&[f32], &[f32]), history: &[f64], out: &mut Vec<f32>)
     out.extend(masks.iter().map(|&m| m as f32));
 }
 
-/// What two outputs of a network say of an unknown.
+/// Converts two outputs of a network to the belief about an unknown.
 #[must_use]
 pub fn belief(first: f64, second: f64, binary: bool) -> Belief {
     if binary {
@@ -234,7 +237,7 @@ mod tests {
 
     use super::*;
 
-    /// A density integrates to 1; the prior's is 1 / (2 b).
+    /// The density integrates to 1; the prior's is 1 / (2 b).
     #[test]
     fn a_belief_is_a_density_on_the_priors_box() {
         let b = Parameter::scaled_bound();
@@ -260,7 +263,7 @@ mod tests {
         assert!((sure.mean() - 0.5).abs() < 1e-12);
     }
 
-    /// 20000 draws: the mean is known to 0.007 deviations.
+    /// 20000 draws: the standard error of the mean is 0.007 standard deviations.
     #[test]
     fn draws_have_the_mean() {
         let mut rng = Streams::new(1).stream("t");
@@ -277,7 +280,7 @@ mod tests {
         }
     }
 
-    /// Two measurements of one thing: precisions add, and so do log-odds.
+    /// Two measurements of one quantity: precisions add, and so do log-odds.
     #[test]
     fn beliefs_of_two_episodes_are_multiplied() {
         let one = Belief::Gaussian {

@@ -1,4 +1,5 @@
-//! Where what is played comes from: a file, what ships with the program, or a training.
+//! Obtains the network to play: from a file, from those that ship with the program, or from a
+//! training.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,33 +15,33 @@ use crate::file::{Description, ObservationEntry, Saved, Tensor, Tensors, write_a
 use crate::shipped;
 use crate::tensorboard::{Scalars, encode};
 
-/// The value of the setting `policy` that trains anew, whatever ships.
+/// Value of the setting `policy` that trains anew even where a policy ships.
 pub const TRAIN: &str = "train";
 
-/// The value of the setting `policy` that plays what ships and trains nothing: of a comparison,
-/// where every run would train by itself.
+/// Value of the setting `policy` that plays the shipped policy and never trains: for comparisons,
+/// where otherwise every run would train.
 pub const SHIPPED: &str = "shipped";
 
 /// Name of the tensor that holds the learning curve, `points x (x, mean, std)`.
 const CURVE: &str = "curve";
 
-/// What a training gives.
+/// Result of a training.
 pub struct Training {
     /// The networks.
     pub tensors: Tensors,
-    /// What the policy takes.
+    /// Inputs of the policy.
     pub observation: Vec<ObservationEntry>,
-    /// Control steps of simulated episodes.
+    /// Number of simulated control steps.
     pub steps: u64,
     /// Figures of the training by name.
     pub figures: Vec<(&'static str, f64)>,
-    /// Return over the training.
+    /// Return over the course of the training.
     pub curve: Vec<CurvePoint>,
-    /// The same and more, for TensorBoard.
+    /// The curve and further values, for TensorBoard.
     pub events: Vec<Scalars>,
 }
 
-/// Trains an explorer; crates that can learn submit one through `inventory`.
+/// Trains an explorer; crates that can train submit one through `inventory`.
 pub struct Trainer {
     /// Name of the explorer.
     pub algorithm: &'static str,
@@ -50,42 +51,42 @@ pub struct Trainer {
 
 inventory::collect!(Trainer);
 
-/// Whether this program can train an explorer.
+/// Whether this program can train the explorer `algorithm`.
 #[must_use]
 pub fn can_train(algorithm: &str) -> bool {
     inventory::iter::<Trainer>().any(|t| t.algorithm == algorithm)
 }
 
-/// An explorer that plays what was learned.
+/// An explorer that plays a learned policy.
 ///
-/// `learned_explorer!` makes it an [`asid_core::Explorer`] and registers it.
+/// `learned_explorer!` implements [`asid_core::Explorer`] for it and registers it.
 pub trait LearnedExplorer: Serialize + DeserializeOwned + Default + PartialEq + Clone {
     /// Name on the command line.
     const NAME: &'static str;
-    /// The setting `policy`: a file, `train`, or nothing.
+    /// The setting `policy`: a file, `train`, `shipped`, or empty.
     fn policy(&self) -> &str;
-    /// Sets it.
+    /// Sets the setting `policy`.
     fn set_policy(&mut self, policy: &str);
     /// Checks every setting.
     ///
     /// # Errors
     /// [`Error::Config`] names the first that is out of its domain.
     fn check(&self) -> Result<()>;
-    /// What the policy takes on a problem.
+    /// Inputs of the policy on a problem.
     ///
     /// # Errors
     /// When the scene lacks a channel of the protocol.
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>>;
-    /// What was trained on the spot.
+    /// Cache of the policy that was trained on the spot.
     fn cache(&self) -> &Cache;
-    /// Plays what was learned.
+    /// Plays a learned policy.
     ///
     /// # Errors
-    /// When it does not fit the problem.
+    /// When the policy does not fit the problem.
     fn play<'a>(&'a self, problem: &'a Problem<'a>, saved: Arc<Saved>) -> Result<Explored<'a>>;
 }
 
-/// Makes a [`LearnedExplorer`] an explorer, and registers it with what it is.
+/// Implements [`asid_core::Explorer`] for a [`LearnedExplorer`] and registers it.
 macro_rules! learned_explorer {
     ($explorer:ty, $about:expr) => {
         asid_core::register!(ExplorerEntry {
@@ -122,7 +123,7 @@ macro_rules! learned_explorer {
 }
 pub(crate) use learned_explorer;
 
-/// What was trained on the spot, kept for the next episode of the same explorer.
+/// Policy that was trained on the spot, kept for further episodes of the same explorer.
 #[derive(Debug, Default)]
 pub struct Cache(Mutex<Option<Arc<Saved>>>);
 
@@ -133,7 +134,7 @@ impl Clone for Cache {
 }
 
 impl PartialEq for Cache {
-    /// It is no setting.
+    /// Always equal: the cache is no setting.
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -150,12 +151,14 @@ impl Cache {
     }
 }
 
-/// What an explorer plays on a problem: from the file of its setting `policy`; where that is
-/// empty and the settings are the task's own, what ships; else trained here and now.
+/// Obtains the policy that an explorer plays on a problem.
+///
+/// It comes from the file that the setting `policy` names. If that is empty and the settings are
+/// the task's own, it is the one that ships. Otherwise it is trained now.
 ///
 /// # Errors
-/// [`Error::Config`] where the file does not fit the problem, [`Error::Missing`] where nothing is
-/// there and this program cannot train.
+/// [`Error::Config`] where the file does not fit the problem, [`Error::Missing`] where there is no
+/// policy and this program cannot train.
 pub fn obtain<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<Arc<Saved>> {
     let cache = explorer.cache();
     let observation = explorer.observation(problem)?;
@@ -201,10 +204,10 @@ pub(crate) fn is_file(setting: &str) -> bool {
     !["", TRAIN, SHIPPED].contains(&setting)
 }
 
-/// What ships for a task under a name, read.
+/// Reads the file that ships for a task under a name.
 ///
 /// # Errors
-/// When it cannot be read, which is a defect of the program.
+/// When the file cannot be read, which is a defect of the program.
 pub fn from_program(task: &str, name: &str) -> Result<Option<Saved>> {
     let Some(file) = shipped::find(task, name) else {
         return Ok(None);
@@ -214,7 +217,7 @@ pub fn from_program(task: &str, name: &str) -> Result<Option<Saved>> {
         .map_err(|why| Error::Failed(format!("what ships as {task}/{name} {why}")))
 }
 
-/// The learning curve that a file holds.
+/// The learning curve stored in a file.
 #[must_use]
 pub fn curve(saved: &Saved) -> Vec<CurvePoint> {
     let rows = saved.tensors.get(CURVE).map(|t| t.values.chunks_exact(3));
@@ -228,7 +231,7 @@ pub fn curve(saved: &Saved) -> Vec<CurvePoint> {
         .collect()
 }
 
-/// Trains an explorer and writes the file, with its curves beside it.
+/// Trains an explorer; writes the file and its curves beside it.
 ///
 /// # Errors
 /// [`Error::Missing`] where this program cannot train, those of the training, and
@@ -244,14 +247,14 @@ pub fn train_to_file<L: LearnedExplorer>(
     Ok(true)
 }
 
-/// Where the curves of a file are: a folder of its own, because TensorBoard takes a folder for a run.
+/// Path of the curves of a file, in their own folder: TensorBoard treats a folder as one run.
 #[must_use]
 pub fn events_of(file: &Path) -> PathBuf {
     file.with_extension("tensorboard")
         .join("events.out.tfevents.0.asid")
 }
 
-/// One training, described.
+/// Runs one training; returns the file with its description, and the events.
 fn train<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<(Saved, Vec<Scalars>)> {
     let trainer = inventory::iter::<Trainer>().find(|t| t.algorithm == L::NAME);
     let Some(trainer) = trainer else {
@@ -293,7 +296,7 @@ fn train<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<(Sav
     Ok((saved, training.events))
 }
 
-/// Whether an explorer has the settings that the task gives it by default.
+/// Whether an explorer's settings are the defaults that the task gives it.
 fn has_own_settings<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<bool> {
     let mut table = registry::defaults::<L>();
     overlay(&mut table, problem.task.settings("explorer", L::NAME));
@@ -304,7 +307,7 @@ fn has_own_settings<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> 
     Ok(own == given)
 }
 
-/// One table over another.
+/// Overlays one table on another, recursively.
 fn overlay(into: &mut Settings, from: Settings) {
     for (key, value) in from {
         match (into.get_mut(&key), value) {
@@ -316,7 +319,7 @@ fn overlay(into: &mut Settings, from: Settings) {
     }
 }
 
-/// That nothing is there to play, and how to get it.
+/// Error that there is no policy to play, with the ways to get one.
 fn missing(task: &str, name: &str, why: &str) -> Error {
     Error::Missing {
         what: format!("a trained policy of `{name}` for `{task}`"),

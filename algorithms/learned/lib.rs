@@ -1,9 +1,9 @@
-//! What was learned beforehand: files of trained networks, and what plays and evaluates them.
+//! Trained networks: their files, and the code that plays and evaluates them.
 //!
-//! Learning needs libtorch; what was learned does not. So the explorers and the identifier that
-//! learn are registered here, with their settings, and act on plain numbers; the crate `asid-nn`,
-//! where it is linked, adds a [`Trainer`] for each. A network comes from a file that the user
-//! names, else from those that ship with the program, else it is trained on the spot.
+//! Training needs libtorch; playing and evaluating do not. So the learned explorers and the learned
+//! identifier are registered here, with their settings, and compute with plain numbers. The crate
+//! `asid-nn`, where it is linked, adds a [`Trainer`] for each. A network comes from a file that the
+//! user names, else from those that ship with the program, else from a training on the spot.
 
 mod belief;
 mod collect;
@@ -48,12 +48,12 @@ pub use task_ppo::TaskPpo;
 
 static COMMIT: OnceLock<&'static str> = OnceLock::new();
 
-/// Says of which commit this program is, for files to carry; the first call counts.
+/// Sets the commit of this program, which files record; only the first call has an effect.
 pub fn set_commit(commit: &'static str) {
     let _ = COMMIT.set(commit);
 }
 
-/// Commit of this program; empty where nothing was said.
+/// Commit of this program; empty if it was not set.
 #[must_use]
 pub fn commit() -> &'static str {
     COMMIT.get().copied().unwrap_or_default()

@@ -1,11 +1,15 @@
-//! MAX (Shyam et al. 2019, "Model-based active exploration"): an ensemble of probabilistic networks
-//! learns how the world moves, and a policy is trained, inside of the ensemble, to go where its
-//! members disagree. It knows nothing of unknown parameters: it seeks what is new.
+//! MAX (Shyam et al. 2019, "Model-based active exploration").
 //!
-//! What differs from the publication: the policy is trained by PPO, not SAC; it is retrained after
-//! every round of episodes, not every 25 steps; only disagreement about what is tracked is sought,
-//! not that about the end effector, which is read without noise and would be most of it; and the
-//! sizes are those of a small machine (5 networks of 2 x 64 where there are 32 of 4 x 512).
+//! An ensemble of probabilistic networks learns the dynamics. A policy is trained inside the
+//! ensemble to go where its members disagree. It uses no unknown parameters: it seeks novelty.
+//!
+//! Differences from the publication:
+//!
+//! - The policy is trained by PPO, not SAC.
+//! - It is retrained after every round of episodes, not every 25 steps.
+//! - Only disagreement about the tracked parts is rewarded. The end effector is read without noise,
+//!   and disagreement about it would dominate.
+//! - The sizes suit a small machine: 5 networks of 2 x 64 instead of 32 of 4 x 512.
 
 use std::sync::Arc;
 
@@ -28,12 +32,12 @@ use crate::ppo_settings::PpoConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Max {
-    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
-    /// `shipped` for what ships alone.
+    /// File of a trained policy. Empty: the one that ships, else trained on the spot. `train`:
+    /// train anew. `shipped`: only the one that ships.
     pub policy: String,
-    /// The policy of this round, counted from 1, is played; 0 for the last.
+    /// Round whose policy is played, counted from 1; 0 for the last.
     pub play_round: usize,
-    /// Real (simulated) episodes of a round.
+    /// Episodes per round in the simulated world, as opposed to imagined ones.
     pub environments: usize,
     /// Rounds of fitting the ensemble, training a policy in it, and playing that policy.
     pub rounds: usize,
@@ -41,11 +45,11 @@ pub struct Max {
     pub warm_up: usize,
     /// The ensemble.
     pub ensemble: EnsembleSettings,
-    /// The learner of the policy, its steps those in imagination and of one round.
+    /// The learner of the policy; its steps are imagined, and are those of one round.
     pub ppo: PpoConfig,
-    /// Imagined episodes at once (published: 128 actors).
+    /// Simultaneous imagined episodes (published: 128 actors).
     pub imagined: usize,
-    /// What was trained on the spot; no setting.
+    /// Policy that was trained on the spot; not a setting.
     #[serde(skip)]
     pub cache: Cache,
 }
@@ -54,13 +58,13 @@ pub struct Max {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnsembleSettings {
-    /// Networks (published: 32).
+    /// Number of networks (published: 32).
     pub models: usize,
-    /// Units of the hidden layers, swish between them (published: 512, 512, 512, 512).
+    /// Units of the hidden layers, with swish activation (published: 512, 512, 512, 512).
     pub hidden: Vec<usize>,
     /// Passes over all transitions after each round (published: 50).
     pub epochs: usize,
-    /// Transitions of a step of Adam (published: 256).
+    /// Transitions per step of Adam (published: 256).
     pub minibatch: usize,
     /// Step size of Adam (published: 1e-3).
     pub learning_rate: f64,
@@ -109,7 +113,7 @@ learned_explorer!(
     "model-based active exploration: goes where learned models disagree (Shyam et al. 2019)"
 );
 
-/// Name of a round's policy in a file, rounds counted from 1.
+/// Name of a round's policy in a file; rounds are counted from 1.
 #[must_use]
 pub fn round_name(round: usize) -> String {
     format!("round.{round}")
@@ -124,7 +128,7 @@ impl LearnedExplorer for Max {
 
     fn set_policy(&mut self, policy: &str) {
         policy.clone_into(&mut self.policy);
-        // Which round is played is no matter of training.
+        // The round to play does not affect the training.
         self.play_round = 0;
     }
 
@@ -175,7 +179,7 @@ impl LearnedExplorer for Max {
     }
 }
 
-/// The file with the policy of an earlier round.
+/// The file with the policy of an earlier round as its policy.
 fn of_round(saved: &Saved, round: usize) -> Result<Saved> {
     let policy =
         Policy::from_tensors(&round_name(round), &saved.tensors).map_err(|why| Error::Config {
@@ -187,23 +191,27 @@ fn of_round(saved: &Saved, round: usize) -> Result<Saved> {
     Ok(saved)
 }
 
-/// What moves, and how it moved: the state of which the models are learned.
+/// State of the motion, on which the models are learned.
 ///
-/// Places and orientations (two columns of the rotation) of tracked parts, the end effector, the
-/// same less what they were a control step ago, since a reading has no velocity; where the end effector is seen
-/// from each tracked place, in the world's directions; then the share of the episode that is over.
+/// It consists of:
+///
+/// - positions and orientations (two columns of the rotation matrix) of the tracked parts, and the
+///   position of the end effector,
+/// - their differences from one control step ago, since a reading has no velocity,
+/// - the end effector's position relative to each tracked position, in world directions,
+/// - the elapsed share of the episode.
 pub struct Motion {
-    /// First entry in a reading's row and number; four are an orientation.
+    /// First entry in a reading's row and number of entries; four entries are an orientation.
     channels: Vec<(usize, usize)>,
     names: Vec<String>,
-    /// How many of the channels, the first, are of tracked parts.
+    /// Number of channels that are tracked parts; they come first.
     tracked: usize,
     horizon: usize,
     before: Vec<f64>,
 }
 
 impl Motion {
-    /// Of a problem's exploration episodes.
+    /// Motion state of a problem's exploration episodes.
     ///
     /// # Errors
     /// When the scene lacks a channel of the protocol.
@@ -227,19 +235,19 @@ impl Motion {
         })
     }
 
-    /// Entries of a place in state space, without the differences.
+    /// Number of entries of positions and orientations, without the differences.
     #[must_use]
     pub fn places(&self) -> usize {
         width(&self.channels)
     }
 
-    /// Those of them, the first, that are of tracked parts.
+    /// Number of these entries that belong to tracked parts; they come first.
     #[must_use]
     pub fn tracked(&self) -> usize {
         width(&self.channels[..self.tracked])
     }
 
-    /// First entries of a tracked place and of the end effector, for each pair.
+    /// For each tracked position and the end effector: the first entries of both.
     #[must_use]
     pub fn relations(&self) -> Vec<[usize; 2]> {
         if self.channels.len() == self.tracked {
@@ -251,7 +259,7 @@ impl Motion {
             .collect()
     }
 
-    /// What the entries of an observation are.
+    /// The entries of an observation, in order.
     #[must_use]
     pub fn entries(&self) -> Vec<ObservationEntry> {
         let places = self.places();
@@ -269,7 +277,7 @@ impl Motion {
     }
 }
 
-/// Entries of a place in state space for these channels.
+/// Number of state entries for these channels, without the differences.
 fn width(channels: &[(usize, usize)]) -> usize {
     let len = |&(_, len): &(usize, usize)| if len == 4 { 6 } else { len };
     channels.iter().map(len).sum()
@@ -296,7 +304,7 @@ impl Observe for Motion {
         if step == 0 || self.before.len() != places {
             self.before = now.to_vec();
         }
-        // What is missing stays where it was.
+        // Missing entries keep their previous value.
         for (x, before) in now.iter_mut().zip(&self.before) {
             if !x.is_finite() {
                 *x = if before.is_finite() { *before } else { 0.0 };
@@ -327,7 +335,7 @@ mod tests {
     fn a_state_has_places_and_their_changes() {
         with_problem("rod-balancing", |problem| {
             let mut motion = Motion::new(problem).unwrap();
-            // Place 3, rotation 6, effector 3.
+            // Position 3, rotation 6, effector 3.
             assert_eq!(motion.places(), 12);
             assert_eq!(motion.tracked(), 9);
             let names = problem.task.exploration().channels();

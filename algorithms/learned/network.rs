@@ -1,8 +1,8 @@
-//! Dense networks as plain numbers: layers `y = x W + b` with one function between them.
+//! Dense networks as plain numbers: layers `y = x W + b` with one activation function between them.
 //!
-//! What acts and estimates needs a few small matrix products, so trained networks are kept as
-//! numbers rather than as handles of libtorch: they can be cloned, shared between threads and
-//! used where libtorch is not.
+//! Acting and estimating need only a few small matrix products. Trained networks are therefore
+//! stored as numbers and not as handles of libtorch: they can be cloned, shared between threads and
+//! used without libtorch.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,20 +12,20 @@ use crate::file::{Tensor, Tensors};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
-    /// `inputs x outputs`, row-major.
+    /// Weights, `inputs x outputs`, row-major.
     pub weight: Vec<f32>,
-    /// `outputs`.
+    /// Biases, `outputs`.
     pub bias: Vec<f32>,
 }
 
 impl Layer {
-    /// Entries that it takes.
+    /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
         self.weight.len() / self.bias.len().max(1)
     }
 
-    /// `y = x W + b`, row by row of `W` so that the inner loop runs over neighbours.
+    /// Computes `y = x W + b` row by row of `W`, so that the inner loop accesses contiguous memory.
     pub fn forward(&self, x: &[f32], y: &mut Vec<f32>) {
         y.clear();
         y.extend_from_slice(&self.bias);
@@ -47,7 +47,7 @@ impl Layer {
         tensors.insert(format!("{prefix}.bias"), bias);
     }
 
-    /// The layers `PREFIX.0`, `PREFIX.1` and so on.
+    /// Reads the layers `PREFIX.0`, `PREFIX.1` and so on.
     pub(crate) fn all_from_tensors(prefix: &str, tensors: &Tensors) -> Result<Vec<Self>, String> {
         let mut layers: Vec<Self> = Vec::new();
         while let (Some(weight), Some(bias)) = (
@@ -75,27 +75,27 @@ impl Layer {
     }
 }
 
-/// Layers with tanh between them.
+/// A network of dense layers with tanh between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
-    /// The layers, first to last, at least one; each takes what the one before gives.
+    /// The layers in order, at least one; the outputs of each are the inputs of the next.
     pub layers: Vec<Layer>,
 }
 
 impl Network {
-    /// Entries that it takes.
+    /// Number of inputs.
     #[must_use]
     pub fn inputs(&self) -> usize {
         self.layers.first().map_or(0, Layer::inputs)
     }
 
-    /// Entries that it gives.
+    /// Number of outputs.
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.layers.last().map_or(0, |l| l.bias.len())
     }
 
-    /// What it gives for one row of inputs.
+    /// Outputs for one row of inputs.
     #[must_use]
     pub fn forward(&self, input: &[f32]) -> Vec<f32> {
         let mut x = input.to_vec();
@@ -104,7 +104,7 @@ impl Network {
     }
 }
 
-/// Replaces the inputs `x` by what layers with tanh between them give; `y` is scratch.
+/// Replaces the inputs `x` by the outputs of layers with tanh between them; `y` is scratch.
 pub(crate) fn forward(layers: &[Layer], x: &mut Vec<f32>, y: &mut Vec<f32>) {
     for (i, layer) in layers.iter().enumerate() {
         if i > 0 {
@@ -136,7 +136,7 @@ mod tests {
         };
         assert_eq!((network.inputs(), network.outputs()), (2, 1));
         let expected = 2.0 * (-0.2_f32).tanh() + 0.5;
-        // Single precision.
+        // Tolerance of single precision.
         assert!((network.forward(&[0.1, 0.3])[0] - expected).abs() < 1e-6);
     }
 }

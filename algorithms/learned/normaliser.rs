@@ -1,15 +1,15 @@
 //! Running mean and standard deviation of observations.
 //!
-//! Observations mix metres, radians and nats; a network with tanh units learns
-//! best from entries of order one. Rewards are never scaled this way: a scale
-//! that moves would break objectives whose per-step rewards telescope.
+//! Observations mix metres, radians and nats; a network with tanh units learns best from entries of
+//! order one. Rewards are never scaled this way: a changing scale would break objectives whose
+//! per-step rewards telescope.
 
 use serde::{Deserialize, Serialize};
 
-/// Scales each entry of an observation by what has been seen of it.
+/// Scales each entry of an observation by its statistics so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Normaliser {
-    /// Observations seen; 0 for the identity.
+    /// Number of observations seen; 0 for the identity.
     count: f64,
     mean: Vec<f64>,
     /// Mean squared deviation from the mean.
@@ -19,7 +19,7 @@ pub struct Normaliser {
 /// Normalised entries are clipped to plus and minus this many standard deviations.
 pub const CLIP: f64 = 10.0;
 
-/// Keeps an entry that never changes from being divided by zero.
+/// Lower bound of a variance: prevents division by zero for an entry that never changes.
 const SMALLEST_VARIANCE: f64 = 1e-8;
 
 impl Normaliser {
@@ -33,16 +33,16 @@ impl Normaliser {
         }
     }
 
-    /// Entries of an observation.
+    /// Number of entries of an observation.
     #[must_use]
     pub fn observation_len(&self) -> usize {
         self.mean.len()
     }
 
-    /// Takes in a batch of observations, `n x observation_len`.
+    /// Adds a batch of observations, `n x observation_len`, to the statistics.
     ///
-    /// The moments of the batch are merged with those so far (Chan et al. 1979),
-    /// so that the outcome does not depend on how observations were batched.
+    /// The moments of the batch are merged with those so far (Chan et al. 1979), so that the result
+    /// does not depend on the batching.
     pub fn update(&mut self, observations: &[f64]) {
         let len = self.mean.len();
         if len == 0 || observations.len() < len {
@@ -64,7 +64,7 @@ impl Normaliser {
         self.count = total;
     }
 
-    /// Writes the normalised observations, `n x observation_len`, as the networks take them.
+    /// Writes the normalised observations, `n x observation_len`, in the networks' precision.
     pub fn normalise(&self, observations: &[f64], normalised: &mut [f32]) {
         if self.count == 0.0 {
             for (out, &x) in normalised.iter_mut().zip(observations) {
@@ -80,13 +80,13 @@ impl Normaliser {
         }
     }
 
-    /// The numbers as a file holds them: how many observations, mean and variance.
+    /// The statistics as stored in a file: number of observations, mean and variance.
     #[must_use]
     pub fn moments(&self) -> (f64, &[f64], &[f64]) {
         (self.count, &self.mean, &self.variance)
     }
 
-    /// Of the numbers of a file.
+    /// Normaliser from the statistics of a file.
     #[must_use]
     pub fn from_moments(count: f64, mean: Vec<f64>, variance: Vec<f64>) -> Self {
         Self {
@@ -96,7 +96,7 @@ impl Normaliser {
         }
     }
 
-    /// Whether all numbers are usable; a file may hold anything.
+    /// Whether all numbers are usable, since a file may hold anything.
     pub(crate) fn is_sound(&self) -> bool {
         self.mean.len() == self.variance.len()
             && self.count >= 0.0
@@ -124,7 +124,7 @@ mod tests {
         let column: Vec<f64> = data.iter().copied().step_by(2).collect();
         let mean = column.iter().sum::<f64>() / 12.0;
         let variance = column.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 12.0;
-        // Rounding relative to squares of about 10^4.
+        // Tolerance: rounding relative to squares of about 10^4.
         assert!((whole.mean[0] - mean).abs() < 1e-10);
         assert!((whole.variance[0] - variance).abs() < 1e-10);
         assert!((whole.variance[1] - parts.variance[1]).abs() < 1e-10);

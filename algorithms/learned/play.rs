@@ -1,4 +1,4 @@
-//! A trained policy in the real world.
+//! Plays a trained policy in the real world.
 
 use std::sync::Arc;
 
@@ -13,24 +13,24 @@ use crate::policy::Policy;
 /// Name of the policy's tensors in a file.
 pub const POLICY: &str = "policy";
 
-/// Makes what a policy sees out of what trackers read.
+/// Turns tracker readings into a policy's observations.
 pub trait Observe: Send {
-    /// Writes the observation of a reading's row before control step `step`.
+    /// Writes the observation for a reading's row before control step `step`.
     ///
     /// # Errors
-    /// When something that is simulated along fails.
+    /// When a simulation that runs along fails.
     fn observe(&mut self, step: usize, reading: &[f64], observation: &mut [f64]) -> Result<()>;
 
-    /// Is told the action, in the task's units.
+    /// Receives the action that was taken, in the task's units.
     ///
     /// # Errors
-    /// When something that is simulated along fails.
+    /// When a simulation that runs along fails.
     fn acted(&mut self, _action: &[f64]) -> Result<()> {
         Ok(())
     }
 }
 
-/// A network that acts by what an [`Observe`] shows it.
+/// A network that acts on the observations of an [`Observe`].
 pub struct Playing<'a> {
     saved: Arc<Saved>,
     network: Policy,
@@ -40,7 +40,7 @@ pub struct Playing<'a> {
 }
 
 impl<'a> Playing<'a> {
-    /// The policy of a file that fits its problem.
+    /// Policy of a file that fits its problem.
     ///
     /// # Errors
     /// [`Error::Failed`] where the file's numbers do not fit its own description.
@@ -66,7 +66,7 @@ impl<'a> Playing<'a> {
         })
     }
 
-    /// The same as what an explorer gives.
+    /// The same policy as the result of an explorer.
     ///
     /// # Errors
     /// As [`Playing::new`].
@@ -84,16 +84,16 @@ impl<'a> Playing<'a> {
     }
 }
 
-/// The policy that a file holds.
+/// The policy stored in a file.
 ///
 /// # Errors
-/// [`Error::Failed`] where it holds none.
+/// [`Error::Failed`] where the file holds none.
 pub fn network(saved: &Saved) -> Result<Policy> {
     Policy::from_tensors(POLICY, &saved.tensors)
         .map_err(|why| Error::Failed(format!("the file {why}")))
 }
 
-/// Name of a problem's action entries with what spans them; what a training maps its outputs by.
+/// A problem's action entries with their ranges, to which a training maps the network's outputs.
 #[must_use]
 pub fn actions(problem: &Problem<'_>) -> Vec<ActionEntry> {
     let coordinates = problem.task.exploration().action.iter();
@@ -113,10 +113,12 @@ impl Plays for Playing<'_> {
     }
 
     /// `{"kind": "network", "observation": [{"name", "len"}], "action": [{"name", "unit",
-    /// "range"}], "network": …, "trained": …}`. The network is what [`Policy`] reads and writes: a
-    /// normaliser `(x - mean) / sqrt(variance)`, clipped at plus and minus 10, then layers
-    /// `y = x W + b` (`weight` is inputs x outputs, row by row) with tanh between them.
-    /// The output, clipped to -1 to 1, spans each action's range. `trained` says how it came about.
+    /// "range"}], "network": …, "trained": …}`.
+    ///
+    /// The network is in the format of [`Policy`]: a normaliser `(x - mean) / sqrt(variance)`,
+    /// clipped at plus and minus 10, then layers `y = x W + b` (`weight` is inputs x outputs, row
+    /// by row) with tanh between them. The outputs, clipped to -1 to 1, span each action's range.
+    /// `trained` describes the training.
     fn export(&self) -> serde_json::Value {
         let d = &self.saved.description;
         json!({

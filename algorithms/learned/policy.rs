@@ -1,8 +1,8 @@
 //! A trained policy as plain numbers.
 //!
-//! Acting needs three small matrix products, so a policy carries its weights
-//! itself rather than a handle of libtorch: it can be cloned, shared between
-//! threads and saved as a JSON file that holds nothing but numbers.
+//! Acting needs three small matrix products, so a policy holds its weights itself and not a handle
+//! of libtorch. It can be cloned, shared between threads and saved as a JSON file that holds
+//! nothing but numbers.
 
 use std::fs;
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::file::{Tensor, Tensors};
 use crate::network::{Layer, forward};
 use crate::normaliser::Normaliser;
 
-/// A Gaussian policy: normaliser, tanh layers, a standard deviation for each action.
+/// A Gaussian policy: normaliser, tanh layers, and a standard deviation per action entry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Policy {
@@ -30,7 +30,7 @@ pub struct Policy {
 const SCHEMA: u32 = 1;
 
 impl Policy {
-    /// A policy of layers that fit each other.
+    /// Policy from layers that fit each other.
     #[must_use]
     pub fn new(normaliser: Normaliser, layers: Vec<Layer>, log_std: Vec<f32>) -> Self {
         Self {
@@ -41,7 +41,7 @@ impl Policy {
         }
     }
 
-    /// One layer without normaliser: `y = x W + b`.
+    /// Policy of one layer without normaliser: `y = x W + b`.
     #[must_use]
     pub fn linear(inputs: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
         let log_std = vec![0.0; bias.len()];
@@ -49,10 +49,10 @@ impl Policy {
         Self::new(Normaliser::identity(inputs), layers, log_std)
     }
 
-    /// Reads a policy out of JSON, such as the `network` of an exported explorer.
+    /// Reads a policy from JSON, such as the `network` of an exported explorer.
     ///
     /// # Errors
-    /// [`Error::Config`] where it is no sound policy.
+    /// [`Error::Config`] where it is no valid policy.
     pub fn from_json(value: &serde_json::Value) -> Result<Self> {
         let wrong = |message: String| Error::Config {
             key: "network".to_owned(),
@@ -65,7 +65,7 @@ impl Policy {
         }
     }
 
-    /// The policy as tensors of a file, their names beginning with `prefix`.
+    /// The policy as tensors, with names that begin with `prefix`.
     pub fn to_tensors(&self, prefix: &str, tensors: &mut Tensors) {
         let (count, mean, variance) = self.normaliser.moments();
         let single = |values: &[f64]| values.iter().map(|&x| x as f32).collect();
@@ -84,10 +84,11 @@ impl Policy {
         tensors.insert(format!("{prefix}.log_std"), log_std);
     }
 
-    /// The policy whose tensors' names begin with `prefix`; the message says what is wrong.
+    /// Reads the policy from the tensors whose names begin with `prefix`; an error says what is
+    /// wrong.
     ///
     /// # Errors
-    /// Where a tensor is missing or the numbers are no sound policy.
+    /// Where a tensor is missing or the numbers are no valid policy.
     pub fn from_tensors(prefix: &str, tensors: &Tensors) -> Result<Self, String> {
         let get = |name: &str| -> Result<Vec<f32>, String> {
             let name = format!("{prefix}.{name}");
@@ -110,13 +111,13 @@ impl Policy {
         }
     }
 
-    /// Entries of one observation.
+    /// Number of entries of an observation.
     #[must_use]
     pub fn observation_len(&self) -> usize {
         self.normaliser.observation_len()
     }
 
-    /// Entries of one action.
+    /// Number of entries of an action.
     #[must_use]
     pub fn action_len(&self) -> usize {
         self.log_std.len()
@@ -132,17 +133,17 @@ impl Policy {
     /// observations, clipped to `[-1, 1]`.
     ///
     /// # Errors
-    /// [`Error::Shape`] where the arrays are not of the same number of rows.
+    /// [`Error::Shape`] where the arrays differ in their number of rows.
     pub fn act(&self, observation: &[f64], action: &mut [f64]) -> Result<()> {
         self.mean(observation, action)?;
         action.iter_mut().for_each(|a| *a = a.clamp(-1.0, 1.0));
         Ok(())
     }
 
-    /// Writes sampled actions, shaped and clipped as those of [`Self::act`].
+    /// Writes sampled actions, with the shape and clipping of [`Self::act`].
     ///
     /// # Errors
-    /// [`Error::Shape`] where the arrays are not of the same number of rows.
+    /// [`Error::Shape`] where the arrays differ in their number of rows.
     pub fn sample(
         &self,
         observation: &[f64],
@@ -191,10 +192,10 @@ impl Policy {
         fs::write(path, text).map_err(|e| file_error(path, e))
     }
 
-    /// Reads what [`Self::save`] wrote.
+    /// Reads a file that [`Self::save`] wrote.
     ///
     /// # Errors
-    /// [`Error::File`] where the file cannot be read or is no sound policy.
+    /// [`Error::File`] where the file cannot be read or is no valid policy.
     pub fn load(path: &Path) -> Result<Self> {
         let text = fs::read_to_string(path).map_err(|e| file_error(path, e))?;
         let policy: Self = serde_json::from_str(&text).map_err(|e| file_error(path, e))?;
@@ -204,7 +205,7 @@ impl Policy {
         }
     }
 
-    /// What is wrong with the numbers, where something is.
+    /// What is wrong with the numbers, if anything.
     fn fault(&self) -> Option<&'static str> {
         if self.schema != SCHEMA {
             return Some("its schema is not 1");
@@ -268,12 +269,13 @@ mod tests {
         let mut action = [0.0; 2];
         by_hand().act(&[0.1, 0.3, 5.0, 0.0], &mut action).unwrap();
         let expected = 2.0 * (-0.2_f64).tanh() + 0.5;
-        // Single precision.
+        // Tolerance of single precision.
         assert!((action[0] - expected).abs() < 1e-6);
         assert_eq!(action[1], 1.0);
     }
 
-    /// 10000 samples: the mean is known to 0.001 (one deviation), the deviation to 0.0007.
+    /// 10000 samples: the standard error of the mean is 0.001, that of the standard deviation
+    /// 0.0007.
     #[test]
     fn samples_have_the_mean_and_the_deviation() {
         let policy = by_hand();

@@ -1,7 +1,7 @@
 //! Settings of PPO, with the defaults of Stable-Baselines3.
 //!
-//! No hyper-parameters of ASID are published, and these are the neutral choice
-//! (Raffin et al. 2021, "Stable-Baselines3", JMLR 22(268); class `PPO`).
+//! The ASID paper publishes no hyper-parameters; these are the neutral choice (Raffin et al. 2021,
+//! "Stable-Baselines3", JMLR 22(268); class `PPO`).
 
 use asid_core::{Error, Result};
 use schemars::JsonSchema;
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PpoConfig {
-    /// Environment steps to train for, over the whole batch. Training ends with
-    /// the update that reaches it.
+    /// Environment steps to train for, over the whole batch. Training ends with the update that
+    /// reaches this number.
     pub total_steps: usize,
     /// Environment steps between two updates, over the whole batch; rounded up
     /// to whole steps of the batch.
     pub n_steps: usize,
-    /// Samples in a minibatch.
+    /// Samples per minibatch.
     pub minibatch: usize,
     /// Passes over the samples of one rollout.
     pub epochs: usize,
@@ -41,18 +41,18 @@ pub struct PpoConfig {
     pub normalise_advantage: bool,
     /// Scales observations by their running mean and standard deviation.
     pub normalise_observation: bool,
-    /// Constant factor on rewards. Returns are reported without it. There is no
-    /// running scale, so that a sum of rewards keeps its meaning.
+    /// Constant factor on rewards. Returns are reported without it. There is no running scale, so
+    /// that a sum of rewards keeps its meaning.
     pub reward_scale: f64,
     /// Ends an update once the policy has moved by 1.5 times this KL divergence.
     pub target_kl: Option<f64>,
     /// Units of the hidden layers (tanh) of the actor and of the critic.
     pub hidden: Vec<usize>,
-    /// Logarithm of the standard deviation of actions at the start.
+    /// Logarithm of the initial standard deviation of actions.
     pub initial_log_std: f64,
-    /// Episodes of the deterministic evaluation at the end; 0 leaves it out.
+    /// Episodes of the deterministic evaluation at the end; 0 for none.
     pub evaluation_episodes: usize,
-    /// `cpu`, `cuda` or `cuda:<index>`. Only `cpu` promises equal results for equal seeds.
+    /// `cpu`, `cuda` or `cuda:<index>`. Only `cpu` guarantees equal results for equal seeds.
     pub device: String,
 }
 
@@ -84,7 +84,8 @@ impl Default for PpoConfig {
 }
 
 impl PpoConfig {
-    /// Checks every value; `section` is the one of the configuration that has these settings, such as `explorer`.
+    /// Checks every value; `section` is the configuration section of these settings, such as
+    /// `explorer`.
     ///
     /// # Errors
     /// [`Error::Config`] names the first key that is out of its domain.

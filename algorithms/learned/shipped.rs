@@ -1,13 +1,13 @@
-//! What ships trained with the program.
+//! Trained networks that ship with the program.
 
-/// A file that is embedded.
+/// An embedded file.
 #[derive(Clone, Copy, Debug)]
 pub struct Shipped {
-    /// The task that it was trained for.
+    /// The task that the network was trained for.
     pub task: &'static str,
     /// Name of the explorer, or `estimator-EXPLORER`.
     pub name: &'static str,
-    /// The file.
+    /// The file's bytes.
     pub bytes: &'static [u8],
 }
 
@@ -22,7 +22,7 @@ pub fn find(task: &str, name: &str) -> Option<Shipped> {
         .copied()
 }
 
-/// Tasks that a file of this name ships for.
+/// Tasks for which a file of this name ships.
 #[must_use]
 pub fn tasks(name: &str) -> Vec<&'static str> {
     ALL.iter()

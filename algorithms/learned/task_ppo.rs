@@ -1,8 +1,8 @@
-//! A policy trained for the task itself, used as an explorer: what a robot that practises its task
-//! happens to find out.
+//! A policy trained for the task itself, used as an explorer: it shows what a robot that practises
+//! its task learns by the way.
 //!
-//! The reward of a control step is by how much it brought the object nearer to the task's goal
-//! ([`asid_core::Task::goal_reward`]), so that the return is the way made in an episode.
+//! The reward of a control step is the progress of the object towards the task's goal
+//! ([`asid_core::Task::goal_reward`]), so the return is the total progress of the episode.
 
 use std::sync::Arc;
 
@@ -22,15 +22,15 @@ use crate::ppo_settings::PpoConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TaskPpo {
-    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
-    /// `shipped` for what ships alone.
+    /// File of a trained policy. Empty: the one that ships, else trained on the spot. `train`:
+    /// train anew. `shipped`: only the one that ships.
     pub policy: String,
     /// Episodes that are simulated at once.
     pub environments: usize,
-    /// The learner; as that of `fisher-ppo`, so that they differ by the reward alone. Rewards are
-    /// ways of tenths of a metre, hence the scale.
+    /// The learner, with the settings of `fisher-ppo`, so that the two differ in the reward alone.
+    /// Rewards are distances of tenths of a metre, hence the scale.
     pub ppo: PpoConfig,
-    /// What was trained on the spot; no setting.
+    /// Policy that was trained on the spot; not a setting.
     #[serde(skip)]
     pub cache: Cache,
 }
@@ -84,14 +84,14 @@ impl LearnedExplorer for TaskPpo {
     }
 }
 
-/// Readings and the clock, and nothing else.
+/// Observes the readings and the clock only.
 pub struct Reading {
     observer: Observer,
     horizon: usize,
 }
 
 impl Reading {
-    /// Of a problem's exploration episodes.
+    /// Observer for a problem's exploration episodes.
     ///
     /// # Errors
     /// When the scene lacks a channel of the protocol.

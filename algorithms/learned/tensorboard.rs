@@ -1,8 +1,8 @@
-//! Event files of TensorBoard: curves of a training, under CleanRL's names.
+//! TensorBoard event files: training curves under CleanRL's names.
 //!
 //! An event file is a sequence of records (TFRecord): the length as eight little-endian bytes, its
-//! masked CRC-32C, the data, its masked CRC-32C. The data is an `Event` of protocol buffers, of
-//! which five fields are used:
+//! masked CRC-32C, the data, and the masked CRC-32C of the data. The data is a protocol-buffer
+//! `Event`, of which five fields are used:
 //!
 //! ```text
 //! Event   { double wall_time = 1; int64 step = 2; string file_version = 3; Summary summary = 5; }
@@ -15,15 +15,15 @@
 /// Values of one step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scalars {
-    /// Environment steps, or whatever the curve counts.
+    /// Environment steps, or another count along the curve.
     pub step: i64,
     /// Seconds since 1970.
     pub wall_time: f64,
-    /// Names, such as `charts/episodic_return`, and values.
+    /// Values with their names, such as `charts/episodic_return`.
     pub values: Vec<(&'static str, f32)>,
 }
 
-/// The bytes of an event file.
+/// Bytes of an event file.
 #[must_use]
 pub fn encode(events: &[Scalars]) -> Vec<u8> {
     let started = events.first().map_or(0.0, |e| e.wall_time);
@@ -93,13 +93,13 @@ fn record(data: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The checksum as TFRecord stores it: rotated and shifted, so that a checksum of data that holds
-/// checksums stays sound.
+/// The checksum as TFRecord stores it: rotated and offset, so that checksums of data that contain
+/// checksums stay sound.
 fn masked(data: &[u8]) -> u32 {
     crc32c(data).rotate_right(15).wrapping_add(0xa282_ead8)
 }
 
-/// CRC-32C (Castagnoli; RFC 3720, appendix B.4), bit by bit: event files are small.
+/// CRC-32C (Castagnoli; RFC 3720, appendix B.4), bit by bit, which suffices for small event files.
 fn crc32c(data: &[u8]) -> u32 {
     /// The polynomial 0x1EDC6F41 with its bits reversed.
     const REVERSED_POLYNOMIAL: u32 = 0x82f6_3b78;
@@ -125,8 +125,8 @@ mod tests {
         assert_eq!(crc32c(&rising), 0x46dd_794e);
     }
 
-    /// The file version at time 0, by hand: 09 and eight bytes of the time, 1a 0d and the text. Its
-    /// length is 24 = 0x18.
+    /// The file version at time 0, by hand: 09 and eight bytes of the time, then 1a 0d and the
+    /// text. Its length is 24 = 0x18.
     #[test]
     fn the_first_record_is_the_version() {
         let file = encode(&[]);
@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(file.len(), 40);
     }
 
-    /// Step 300 takes two bytes, ac 02; 1.5 is 00 00 c0 3f.
+    /// Step 300 takes two bytes, ac 02; the float 1.5 is 00 00 c0 3f.
     #[test]
     fn a_value_is_a_tag_and_a_float() {
         let event = Scalars {

@@ -1,4 +1,4 @@
-//! Problems for tests, in the engine that needs no native library.
+//! Problems for tests, in the engine without a native library.
 
 use std::sync::atomic::AtomicU64;
 

@@ -1,5 +1,5 @@
-//! Training of an estimator: episodes are collected, a network is fitted to most of them, its deviations are
-//! calibrated on others, and it is scored on the rest.
+//! Training of an estimator: collects episodes, fits a network to most of them, calibrates its
+//! standard deviations on others, and scores it on the rest.
 
 use std::time::Instant;
 
@@ -12,18 +12,18 @@ use crate::file::{Description, Saved, Tensors};
 use crate::inference::Inference;
 use crate::tensorboard::Scalars;
 
-/// What fitting a network to episodes gives.
+/// Result of fitting a network to episodes.
 pub struct Fitted {
     /// The network, not yet calibrated.
     pub inference: Inference,
-    /// Losses over the epochs.
+    /// Losses by epoch.
     pub events: Vec<Scalars>,
 }
 
-/// Fits networks; a crate that can learn submits one through `inventory`.
+/// Fits networks; a crate that can train submits one through `inventory`.
 #[allow(clippy::type_complexity)] // its arguments are what it is
 pub struct EstimatorTrainer {
-    /// Fits to the first dataset, and keeps the epoch that is best on the second.
+    /// Fits to the first dataset and keeps the epoch that is best on the second.
     pub fit: fn(
         settings: &Estimator,
         parameters: &[Parameter],
@@ -42,7 +42,7 @@ pub fn can_train() -> bool {
 }
 
 impl Estimator {
-    /// Learns from episodes of an explorer.
+    /// Trains on episodes of an explorer.
     pub(super) fn learn(
         &self,
         problem: &Problem<'_>,
@@ -78,7 +78,7 @@ impl Estimator {
         Ok((saved, events))
     }
 
-    /// Fits, calibrates and scores.
+    /// Fits, calibrates and scores a network.
     #[allow(clippy::type_complexity)]
     fn fitted(
         &self,
@@ -113,12 +113,12 @@ impl Estimator {
     }
 }
 
-/// How good a network is at one unknown, on episodes that it has not seen.
+/// Quality of a network's belief about one unknown, on episodes that it was not trained on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
     /// Root mean square error over that of the prior's mean.
     pub error_over_prior: f64,
-    /// Share of the truths inside of the central 95 % (for a binary unknown: guessed right).
+    /// Share of the truths inside the central 95 % (for a binary unknown: guessed correctly).
     pub coverage95: f64,
     /// Mean of `log q(truth) - log prior(truth)`, nats.
     pub information: f64,

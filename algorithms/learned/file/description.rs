@@ -1,4 +1,4 @@
-//! How what a file holds came about, and what it fits.
+//! Description of a trained file: its training, and the problems that it fits.
 
 use std::collections::BTreeMap;
 
@@ -6,28 +6,28 @@ use asid_core::task::Coordinate;
 use asid_core::{Parameter, Problem};
 use serde::{Deserialize, Serialize};
 
-/// Some entries of an observation that belong together.
+/// A group of observation entries that belong together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObservationEntry {
-    /// What they are.
+    /// What the entries are.
     pub name: String,
-    /// How many.
+    /// Number of entries.
     pub len: usize,
 }
 
 /// An entry of an action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionEntry {
-    /// What it is.
+    /// What the entry is.
     pub name: String,
     /// SI unit.
     pub unit: String,
-    /// What -1 and 1 of the network stand for.
+    /// Values for the network's outputs -1 and 1, in the unit.
     pub range: [f64; 2],
 }
 
 impl ActionEntry {
-    /// The entry of a coordinate.
+    /// The entry for a coordinate.
     #[must_use]
     pub fn of(coordinate: &Coordinate) -> Self {
         Self {
@@ -37,7 +37,7 @@ impl ActionEntry {
         }
     }
 
-    /// Action in its unit for an output of the network.
+    /// Action in its unit for an output of the network in -1 to 1.
     #[must_use]
     pub fn span(&self, output: f64) -> f64 {
         let [low, high] = self.range;
@@ -45,7 +45,7 @@ impl ActionEntry {
     }
 }
 
-/// How what a file holds came about, and what it is for.
+/// Description of a trained file: its training, and what it is for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Description {
@@ -59,21 +59,21 @@ pub struct Description {
     pub explorer: String,
     /// Engine of the training, with its version.
     pub engine: String,
-    /// Version of the program.
+    /// Version of the program that trained it.
     pub asid: String,
-    /// Its commit.
+    /// Commit of that program.
     pub git: String,
     /// Seed of the training.
     pub seed: u64,
-    /// All settings.
+    /// All settings of the algorithm.
     pub settings: serde_json::Value,
-    /// What the network takes, in order.
+    /// Inputs of the network, in order.
     pub observation: Vec<ObservationEntry>,
-    /// What it gives.
+    /// Outputs of the network.
     pub action: Vec<ActionEntry>,
-    /// The unknowns, with the priors that were drawn from.
+    /// The unknowns, with the priors of the training.
     pub parameters: Vec<Parameter>,
-    /// Control steps of simulated episodes.
+    /// Number of simulated control steps in training.
     pub training_steps: u64,
     /// Wall-clock time of the training, s.
     pub seconds: f64,
@@ -85,7 +85,8 @@ pub struct Description {
 pub(super) const SCHEMA: u32 = 1;
 
 impl Description {
-    /// Of a training on `problem` that has just ended: names, versions, actions and unknowns.
+    /// Description of a training on `problem` that has just ended: names, versions, actions and
+    /// unknowns.
     #[must_use]
     pub fn new(algorithm: &str, problem: &Problem<'_>, settings: serde_json::Value) -> Self {
         Self {
@@ -109,7 +110,8 @@ impl Description {
         }
     }
 
-    /// What keeps it from being used for `algorithm` on `problem` with these observations.
+    /// Why the file cannot be used for `algorithm` on `problem` with these observations, if it
+    /// cannot.
     #[must_use]
     pub fn misfit(
         &self,
