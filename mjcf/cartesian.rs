@@ -1,14 +1,12 @@
-//! Cartesian control of an arm with joint servos: damped least squares on the
-//! *commanded* joints.
+//! Cartesian control of an arm with joint servos: damped least squares on *commanded* joints.
 //!
-//! The controller is feed-forward: it integrates its own reference and never
-//! looks at measured joints. The commands of an episode are therefore a function
-//! of its actions alone, the same for every engine, and a log of the commands is
-//! the episode.
+//! The controller is feed-forward: it integrates its own reference and never reads measured joints.
+//! The commands of an episode are therefore a function of its actions alone, the same for every
+//! engine, and a log of the commands defines the episode.
 //!
-//! A position servo with damping trails its command by `(kv + damping) / kp`
-//! seconds (0.1 s and more for a Panda as it is used here). The commands lead the
-//! reference by that time, so that the arm itself follows the reference.
+//! A position servo with damping trails its command by `(kv + damping) / kp` seconds (0.1 s and
+//! more for a Panda as it is used here). The commands lead the reference by that time, so that the
+//! arm itself follows the reference.
 
 use nalgebra::{DMatrix, Isometry3, SMatrix, SVector, UnitQuaternion, Vector3};
 
@@ -19,11 +17,11 @@ use asid_core::scene::Scene;
 /// Gains and limits of the controller.
 #[derive(Clone, Copy, Debug)]
 pub struct CartesianSettings {
-    /// Damping of the least squares; larger is smoother near singular postures.
+    /// Damping of the least squares; larger values are smoother near singular postures.
     pub damping: f64,
-    /// Rate at which an error of position or rotation is worked off, 1/s.
+    /// Rate at which an error of position or rotation decays, 1/s.
     pub gain: f64,
-    /// Rate at which the joints drift back to the home posture where the hand does not mind, 1/s.
+    /// Rate at which the joints return to the home posture in the null space of the task, 1/s.
     pub posture_gain: f64,
     /// Largest acceleration of the reference, m/s².
     pub max_acceleration: f64,
@@ -43,7 +41,7 @@ impl Default for CartesianSettings {
     }
 }
 
-/// A reference that a site follows with the orientation of the home posture.
+/// Moves a site along a reference, with the orientation of the home posture.
 #[derive(Clone, Debug)]
 pub struct CartesianController {
     chain: Chain,
@@ -60,10 +58,12 @@ pub struct CartesianController {
 }
 
 impl CartesianController {
-    /// A controller of `site` that starts at the joints `home` (one a joint of the chain, rad or m).
+    /// A controller of `site` that starts at the joint positions `home` (one for each joint, rad or
+    /// m).
     ///
     /// # Errors
-    /// When the scene has no such chain, `home` does not fit it, or a joint of it has no position servo.
+    /// When the scene has no such chain, `home` does not fit it, or one of its joints has no
+    /// position servo.
     pub fn new(
         scene: &Scene,
         site: &str,
@@ -95,7 +95,7 @@ impl CartesianController {
         })
     }
 
-    /// Back to the home posture, at rest.
+    /// Returns to the home posture, at rest.
     pub fn reset(&mut self) {
         self.q.copy_from_slice(&self.home);
         self.position = self.start;
@@ -108,14 +108,17 @@ impl CartesianController {
         self.position
     }
 
-    /// `world_from_site` at the reference's joints.
+    /// Pose `world_from_site` at the reference's joints.
     #[must_use]
     pub fn pose(&self) -> Isometry3<f64> {
         self.chain.forward(&self.q, None)
     }
 
-    /// Moves the reference for `dt` seconds towards the velocity `wanted` (m/s), within the
-    /// largest acceleration and where `clamp` lets it go, and writes the commands (one a joint).
+    /// Moves the reference for `dt` seconds towards the velocity `wanted` (m/s), and writes the
+    /// commands.
+    ///
+    /// The acceleration is limited, and `clamp` limits the position. There is one command for each
+    /// joint.
     pub fn steer(
         &mut self,
         wanted: Vector3<f64>,
@@ -134,7 +137,8 @@ impl CartesianController {
         self.follow(next, dt, ctrl);
     }
 
-    /// Moves the reference to `next` (m) within `dt` seconds and writes the commands (one a joint).
+    /// Moves the reference to `next` (m) within `dt` seconds, and writes one command for each
+    /// joint.
     pub fn follow(&mut self, next: Vector3<f64>, dt: f64, ctrl: &mut [f64]) {
         let s = &self.settings;
         self.velocity = (next - self.position) / dt;
@@ -142,7 +146,7 @@ impl CartesianController {
         let linear = self.velocity + s.gain * (self.position - pose.translation.vector);
         let angular = s.gain * (self.rotation * pose.rotation.inverse()).scaled_axis();
         let n = self.q.len();
-        // Towards the target with J^T (J J^T + damping^2)^-1, and home in what J does not see.
+        // Towards the target by J^T (J J^T + damping^2)^-1, and home in the null space of J.
         let mut posture = [0.0; MAX_LINKS];
         let mut error = SVector::<f64, 6>::zeros();
         error.fixed_rows_mut::<3>(0).copy_from(&linear);
@@ -186,14 +190,13 @@ impl CartesianController {
                 *c = c.clamp(*low, *high);
             }
         }
-        // Where the joints are too slow the reference waits for them.
+        // Where the joints are too slow, the reference waits for them.
         self.position += (next - self.position) * scale;
         self.velocity *= scale;
     }
 }
 
-/// For each joint of the chain: seconds by which it trails its servo's command,
-/// and the range of that command.
+/// For each joint of the chain: the lag (s) behind its servo's command, and the command's range.
 fn servos(scene: &Scene, chain: &Chain) -> Result<Vec<(f64, Option<[f64; 2]>)>> {
     let model = scene.description()?;
     chain
@@ -257,7 +260,8 @@ mod tests {
         for _ in 0..50 {
             controller.follow(goal, 0.02, &mut ctrl);
         }
-        // The damping leaves damping^2 / sigma^2 of the posture's pull: some 0.1 mm and 1 mrad here.
+        // The damping leaves damping^2 / sigma^2 of the posture's pull: about 0.1 mm and 1 mrad
+        // here.
         assert!((controller.pose().translation.vector - goal).norm() < 1e-3);
         assert!(controller.pose().rotation.angle_to(&rotation) < 1e-2);
         controller.reset();

@@ -1,5 +1,6 @@
-//! The layout of a scene, as MuJoCo orders it, read from the parsed document: for
-//! engines that have no compiler of their own.
+//! The layout of a scene in MuJoCo's order, read from the parsed document.
+//!
+//! It serves engines that have no compiler of their own.
 
 use mjcf_rs::Model;
 use mjcf_rs::body::JointType;
@@ -8,7 +9,7 @@ use asid_core::error::{Error, Result};
 use asid_core::layout::{Actuator, Joint, JointKind, Keyframe, Layout, Sensor, sensor_len};
 use asid_core::scene::Scene;
 
-/// Names and places of a parsed scene.
+/// Names and indices of a parsed scene.
 ///
 /// # Errors
 /// When a keyframe's lengths do not fit.
@@ -122,8 +123,10 @@ pub fn joint_kind(kind: JointType) -> JointKind {
     }
 }
 
-/// MuJoCo's `qpos0`, length `nq`: free bodies where the document has them, balls
-/// unturned, hinges and slides at their `ref`.
+/// MuJoCo's `qpos0`, length `nq`.
+///
+/// Free bodies have their declared pose, ball joints no rotation, and hinges and slides their
+/// `ref`.
 #[must_use]
 pub fn default_qpos(model: &Model, layout: &Layout) -> Vec<f64> {
     let mut qpos = vec![0.0; layout.nq];

@@ -1,7 +1,7 @@
 //! Forward kinematics of one chain of a scene, read from its document.
 //!
-//! The controller that drives the arm must be the same for every engine, so its
-//! kinematics come from the scene and not from an engine.
+//! The controller of the arm must be the same for every engine, so its kinematics come from the
+//! scene and not from an engine.
 
 use mjcf_rs::body::JointType;
 use nalgebra::{DMatrix, Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -20,9 +20,9 @@ struct Link {
     axis: Unit<Vector3<f64>>,
     /// Hinge (true) or slide (false).
     hinge: bool,
-    /// Coordinate at which the body is in its declared pose.
+    /// Coordinate at which the body has its declared pose.
     reference: f64,
-    /// Limits, where it has any.
+    /// Limits of the coordinate, if any.
     range: Option<[f64; 2]>,
 }
 
@@ -46,8 +46,8 @@ impl Chain {
     /// The chain from the world to the site of this name.
     ///
     /// # Errors
-    /// When there is no such site, or a joint of the chain is neither hinge nor slide,
-    /// or a body on it has several joints.
+    /// When there is no such site, a joint of the chain is neither hinge nor slide, a body on it
+    /// has several joints, or it has more than [`MAX_LINKS`] joints.
     pub fn to_site(scene: &Scene, site: &str) -> Result<Self> {
         let model = scene.description()?;
         let fail = |message: String| Error::Scene {
@@ -120,7 +120,7 @@ impl Chain {
         self.links.len()
     }
 
-    /// True where the site is fixed to the world.
+    /// Whether the site is fixed to the world.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.links.is_empty()
@@ -141,9 +141,10 @@ impl Chain {
         }
     }
 
-    /// `world_from_site` at the coordinates `q` (rad or m, `n`), and, where
-    /// `jacobian` is given (`6 x n`), the site's linear then angular velocity in
-    /// the world frame per unit of each joint's velocity.
+    /// Pose `world_from_site` at the coordinates `q` (rad or m, `n`), and its Jacobian.
+    ///
+    /// If given, `jacobian` (`6 x n`) receives the site's linear, then angular velocity in the
+    /// world frame per unit of each joint's velocity.
     pub fn forward(&self, q: &[f64], jacobian: Option<&mut DMatrix<f64>>) -> Isometry3<f64> {
         let mut world = Isometry3::identity();
         let mut axes = [(Vector3::zeros(), Vector3::zeros(), true); MAX_LINKS];
@@ -184,7 +185,7 @@ impl Chain {
     }
 }
 
-/// Joints of the longest chain that is followed.
+/// Most joints of a chain: the size of its buffers.
 pub const MAX_LINKS: usize = 32;
 
 #[cfg(test)]
@@ -230,7 +231,8 @@ mod tests {
             let linear = (up.translation.vector - down.translation.vector) / (2.0 * h);
             let angular = (up.rotation * down.rotation.inverse()).scaled_axis() / (2.0 * h);
             for k in 0..3 {
-                // Central differences are exact to h^2 = 1e-12, rounding to 1e-10.
+                // The truncation error of central differences is about h^2 = 1e-12, rounding about
+                // 1e-10.
                 assert!((jacobian[(k, i)] - linear[k]).abs() < 1e-8);
                 assert!((jacobian[(k + 3, i)] - angular[k]).abs() < 1e-8);
             }

@@ -1,11 +1,12 @@
-//! What an MJCF document says of a machine, for code that is no engine.
+//! What an MJCF document says of a machine, independent of any engine.
 //!
-//! [`asid_core::Scene`] is the document. Here it is read: the [layout](document) as MuJoCo orders it,
-//! [masses](mass), the [`kinematics`] of a chain and its [Cartesian control](cartesian), and
-//! the [`Plant`]: drives, joints, geoms and pairs that may touch, as effects and the diagnosis see them.
+//! [`asid_core::Scene`] is the document. This crate reads it: the [layout](document) as MuJoCo
+//! orders it, [masses](mass), the [`kinematics`] of a chain and its [Cartesian control](cartesian),
+//! and the [`Plant`]. The plant has the drives, joints, geoms and pairs that may touch, as effects
+//! and the diagnosis need them.
 //!
-//! The other way, [`native`] writes values and effects back into a document, by [`markup`] that leaves all else
-//! as its author wrote it.
+//! In the other direction, [`native`] writes values and effects back into a document, by [`markup`]
+//! that preserves all other text.
 
 pub mod cartesian;
 pub mod document;

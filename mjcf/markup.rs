@@ -1,21 +1,21 @@
-//! Changes of an MJCF document that leave all else as its author wrote it.
+//! Edits of an MJCF document that preserve all other text.
 //!
-//! A document that is parsed and printed anew loses its comments, its order and the layout of its lines. Here only
-//! the tags of elements that change are written again, in place.
+//! Parsing and printing a document loses its comments, its order and its line layout. Here only the
+//! tags of elements that change are written anew, in place.
 
 use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node, NodeId};
 
-/// What becomes of one element.
+/// Changes of one element.
 #[derive(Debug, Default)]
 struct Change {
     tag: Option<String>,
-    /// New values by attribute; `None` takes the attribute away.
+    /// New values by attribute; `None` removes the attribute.
     attributes: Vec<(String, Option<String>)>,
-    /// Elements to put behind its children.
+    /// XML to append to its children.
     children: String,
-    /// Elements to put behind it.
+    /// XML to insert after it.
     after: String,
 }
 
@@ -55,12 +55,12 @@ impl<'d> Markup<'d> {
         self.put(node, attribute, Some(value.into()));
     }
 
-    /// Sets an attribute to numbers.
+    /// Sets an attribute to a list of numbers.
     pub fn set_numbers(&mut self, node: Node<'_, '_>, attribute: &str, values: &[f64]) {
         self.set(node, attribute, numbers(values));
     }
 
-    /// Takes an attribute away.
+    /// Removes an attribute.
     pub fn remove(&mut self, node: Node<'_, '_>, attribute: &str) {
         self.put(node, attribute, None);
     }
@@ -76,12 +76,12 @@ impl<'d> Markup<'d> {
         self.change(node).tag = Some(tag.to_owned());
     }
 
-    /// Puts elements behind the children of one.
+    /// Appends XML to the children of an element.
     pub fn append(&mut self, node: Node<'_, '_>, xml: &str) {
         self.change(node).children += xml;
     }
 
-    /// Puts elements behind one.
+    /// Inserts XML after an element.
     pub fn after(&mut self, node: Node<'_, '_>, xml: &str) {
         self.change(node).after += xml;
     }
@@ -90,7 +90,7 @@ impl<'d> Markup<'d> {
     #[must_use]
     pub fn text(&self) -> String {
         let text = self.document.input_text();
-        // Pieces of the text and what takes their place; an empty piece is an insertion.
+        // Ranges of the text and their replacements; an empty range is an insertion.
         let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
         for (&id, change) in &self.changes {
             let Some(node) = self.document.get_node(NodeId::new(id)) else {
@@ -120,7 +120,7 @@ fn edits_of(
     let whole = node.range();
     let old = node.tag_name().name();
     let tag = change.tag.as_deref().unwrap_or(old);
-    // The end of the opening tag: the first `>` behind the last attribute.
+    // The end of the opening tag: the first `>` after the last attribute.
     let from = node.attributes().map(|a| a.range().end).max();
     let from = from.unwrap_or(whole.start + 1 + old.len());
     let close = text[from..whole.end]
@@ -163,14 +163,14 @@ fn edits_of(
     edits
 }
 
-/// Numbers as an attribute has them: each the shortest text that reads back as the same.
+/// Numbers as the text of an attribute, each the shortest that reads back as the same value.
 #[must_use]
 pub fn numbers(values: &[f64]) -> String {
     let texts: Vec<String> = values.iter().map(|x| format!("{x}")).collect();
     texts.join(" ")
 }
 
-/// A text as the value of an attribute.
+/// Escapes a text as the value of an attribute.
 #[must_use]
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")

@@ -1,9 +1,8 @@
 //! Mass properties of a body from its geoms.
 //!
-//! A compiled model keeps one mass a body, but users know geoms: "the payload
-//! weighs 0.4 kg", "the weight sits 6 cm off the middle". Changing a geom's mass
-//! or place changes its body's mass, centre and inertia; the formulas are here
-//! once, so that every engine agrees.
+//! A compiled model has one mass for each body, but users know geoms: "the payload weighs 0.4 kg",
+//! "the weight sits 6 cm off the middle". Changing a geom's mass or position changes its body's
+//! mass, centre and inertia. The formulas are here once, so that all engines agree.
 
 use mjcf_rs::body::{Geom, GeomType};
 use nalgebra::{Matrix3, Quaternion, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
@@ -36,8 +35,9 @@ pub struct MassProperties {
 }
 
 impl GeomMass {
-    /// Mass properties of a primitive geom as MJCF defines them; `None` for a
-    /// plane, a mesh or a height field.
+    /// Mass properties of a primitive geom as MJCF defines them.
+    ///
+    /// `None` for a plane, a mesh or a height field.
     #[must_use]
     pub fn of(geom: &Geom) -> Option<Self> {
         let (pose, size) = placed(geom);
@@ -62,7 +62,7 @@ pub fn placed(geom: &Geom) -> (mjcf_rs::Pose, [f64; 3]) {
     let mut pose = geom.pose;
     if let Some([x1, y1, z1, x2, y2, z2]) = geom.fromto {
         let (a, b) = (Vector3::new(x1, y1, z1), Vector3::new(x2, y2, z2));
-        // z points from the second end to the first, as MuJoCo has it.
+        // As in MuJoCo, z points from the second end to the first.
         let along = a - b;
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
@@ -113,7 +113,7 @@ fn primitive(kind: GeomType, [a, b, c]: [f64; 3]) -> Option<(f64, Vector3<f64>)>
 }
 
 impl MassProperties {
-    /// The union of some geoms, by the parallel axis theorem.
+    /// Mass properties of several geoms together, by the parallel axis theorem.
     #[must_use]
     pub fn of_geoms(geoms: &[GeomMass]) -> Self {
         let mass: f64 = geoms.iter().map(|g| g.mass).sum();
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn a_weight_off_the_middle_moves_the_center() {
-        // 0.05 kg rod and a 0.15 kg weight at 0.08 m: the centre is at 3/4 of it.
+        // 0.05 kg rod and a 0.15 kg weight at 0.08 m: the centre is at 3/4 of that.
         let geoms = [
             solid_box(0.05, [0.02, 0.15, 0.02], [0.0; 3]),
             solid_box(0.15, [0.01; 3], [0.0, 0.08, 0.0]),

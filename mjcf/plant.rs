@@ -1,8 +1,8 @@
-//! The machine as its document describes it: what moves what, and what can touch what.
+//! The machine as its document describes it: its tree, its drives, and what can touch what.
 //!
-//! Effects are attached to a machine and not to an engine, so what they need to
-//! know of it (the law of a servo, the parent of a body, the friction that wins in
-//! a contact) is read from the document, once, for all engines.
+//! Effects are attached to a machine, not to an engine. What they need to know of it (the law of a
+//! servo, the parent of a body, the friction that counts in a contact) is therefore read from the
+//! document, once for all engines.
 
 mod drive;
 mod jacobian;
@@ -17,15 +17,15 @@ pub use drive::{Drive, DriveLaw};
 /// A body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantBody {
-    /// Index of its parent; the world is its own.
+    /// Index of its parent; the world is its own parent.
     pub parent: usize,
     /// Its joints, as indices in [`Layout::joints`].
     pub joints: std::ops::Range<usize>,
-    /// Mass, kg; 0 where it has none of its own.
+    /// Mass, kg; 0 for a body without mass.
     pub mass: f64,
     /// Centre of mass in its frame, m.
     pub center: [f64; 3],
-    /// Topmost body that it is rigidly joined to; 0 where it cannot move.
+    /// Topmost body that it is rigidly fixed to; 0 where it cannot move.
     pub weld: usize,
 }
 
@@ -38,7 +38,7 @@ pub struct PlantJoint {
     pub anchor: [f64; 3],
     /// Axis in the body's frame.
     pub axis: [f64; 3],
-    /// Coordinate at which the body is as declared.
+    /// Coordinate at which the body has its declared pose.
     pub reference: f64,
     /// Range of a hinge or slide, rad or m; `None` where it is not limited.
     pub range: Option<[f64; 2]>,
@@ -59,9 +59,9 @@ pub struct PlantGeom {
     pub friction: [f64; 3],
     /// Dimensions of its contacts: 3 sliding, 4 also torsional, 6 also rolling.
     pub condim: u32,
-    /// Whose friction counts.
+    /// Priority: the friction of the geom with the higher one counts.
     pub priority: i32,
-    /// Whether its mass is its own, to be changed.
+    /// Whether the body's mass comes from its geoms, so that this geom's mass can be changed.
     pub has_mass: bool,
 }
 
@@ -76,10 +76,10 @@ pub enum Reads {
     Other,
 }
 
-/// A machine: the document's tree, its drives, and who can touch whom.
+/// A machine: the document's tree, its drives, and the geoms that can touch.
 #[derive(Clone, Debug)]
 pub struct Plant {
-    /// Names and places.
+    /// Names and indices.
     pub layout: Layout,
     /// Gravity, m/s².
     pub gravity: [f64; 3],
@@ -89,9 +89,9 @@ pub struct Plant {
     pub joints: Vec<PlantJoint>,
     /// Geoms, in the layout's order.
     pub geoms: Vec<PlantGeom>,
-    /// Actuators, in the layout's order; `None` for one that is no plain drive of a joint.
+    /// Drives of the actuators, in the layout's order; `None` for one that is not a plain drive.
     pub drives: Vec<Option<Drive>>,
-    /// Sensors, in the layout's order.
+    /// What each sensor reads, in the layout's order.
     pub sensors: Vec<Reads>,
     /// Pairs of geoms that can touch, each once, the smaller index first.
     pub contacts: Vec<[usize; 2]>,
@@ -100,7 +100,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Drives of a joint, as indices of actuators.
+    /// Drives of a joint, with the indices of their actuators.
     pub fn drives_of(&self, joint: usize) -> impl Iterator<Item = (usize, &Drive)> {
         let drives = self.drives.iter().enumerate();
         drives.filter_map(move |(i, d)| d.as_ref().filter(|d| d.joint == joint).map(|d| (i, d)))
@@ -123,8 +123,9 @@ impl Plant {
             .find(|&j| self.layout.joints[j].kind == JointKind::Free)
     }
 
-    /// Geoms that make the mass of a body, as indices in [`Layout::geoms`]; none where the document states the body's inertia, or the
-    /// plant has no such body.
+    /// Geoms that determine the mass of a body, as indices in [`Layout::geoms`].
+    ///
+    /// None where the document states the body's inertia, or the plant has no such body.
     pub fn geoms_with_mass(&self, body: &str) -> impl Iterator<Item = usize> {
         let body = self.layout.bodies.iter().position(|b| b == body);
         let geoms = self.geoms.iter().enumerate();
@@ -139,7 +140,8 @@ impl Plant {
         self.bodies[body].weld != 0
     }
 
-    /// Geom whose friction counts in a contact of two: the higher priority, else the larger.
+    /// The geom whose friction counts in a contact: by the higher priority, else the larger
+    /// coefficient.
     #[must_use]
     pub fn dominant(&self, [a, b]: [usize; 2], entry: usize) -> usize {
         let (x, y) = (&self.geoms[a], &self.geoms[b]);
@@ -151,10 +153,10 @@ impl Plant {
         }
     }
 
-    /// Index of the actuator of this name with its drive.
+    /// The actuator of this name: its index and its drive.
     ///
     /// # Errors
-    /// When there is none, or it is no plain drive of a joint.
+    /// When there is none, or it is not a plain drive of a joint.
     pub fn drive(&self, name: &str) -> Result<(usize, Drive)> {
         let i = self.layout.actuator(name)?;
         let drive = self.drives[i].ok_or_else(|| {
@@ -254,7 +256,7 @@ mod tests {
         let radian = r#"<compiler angle="radian"/>"#;
         let of_class = r#"<joint class="narrow"/><joint class="narrow" limited="false"/><joint/>"#;
         assert_eq!(ranges(radian, of_class), [Some([-0.3, 0.3]), None, None]);
-        // An angle is in degrees where nothing else is said; a length never is.
+        // Angles are in degrees by default; lengths never are.
         let found = ranges(
             "",
             r#"<joint range="-90 45"/><joint type="slide" range="-2 1"/>"#,

@@ -119,7 +119,9 @@ impl Dataset {
         itself.iter().filter(|x| x.is_finite()).count()
     }
 
-    /// Residuals `(logged - predicted) / noise` of an episode, `rows x entries`; NaN where a reading is missing.
+    /// Residuals `(logged - predicted) / noise` of an episode, `rows x entries`.
+    ///
+    /// NaN where a reading is missing.
     #[must_use]
     pub fn residuals(&self, trial: &Trial, predicted: &[f64]) -> Vec<f64> {
         let (width, entries) = (self.differences.width(), self.entries());

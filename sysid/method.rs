@@ -58,20 +58,21 @@ impl Method {
     }
 }
 
-/// How widely the search goes.
+/// Settings of a method: size of the motion's parametrisation, and effort of the search.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
-    /// Heights of a spline an actuator: more follow faster motions, and need a longer search.
+    /// Spline heights for each actuator: more follow faster motions, and need a longer search.
     pub knots: usize,
-    /// Harmonics of a Fourier series an actuator: five in the field's usual excitations (Swevers 1997).
+    /// Harmonics of a Fourier series for each actuator: five in usual excitations (Swevers 1997).
     pub harmonics: usize,
-    /// Rounds of the search at most.
+    /// Most rounds of the search.
     pub iterations: usize,
-    /// Candidates a round.
+    /// Candidates in a round.
     pub population: usize,
-    /// Physics steps of the whole search, which bound its time: after them no round begins, of which 8 are kept. Two cores
-    /// take some 5e5 steps of an arm of six joints a second; those of a machine of more coordinates count for more.
+    /// Physics steps of the whole search, which bound its time: after them no round begins, but at
+    /// least 8 rounds are done. Two cores take about 5e5 steps of an arm of six joints per second;
+    /// steps of a machine with more coordinates count for more.
     pub physics_steps: f64,
 }
 

@@ -1,9 +1,9 @@
-//! Actuators: gains, bias, delay, lag, and the limit of the force.
+//! Writes actuators: gains, bias, delay, lag, and the limit of the force.
 //!
-//! MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms: force
-//! `g w + b0 + b1 q + b2 v`, `w` the command after its range, its delay and its filter. A command that is scaled and
-//! shifted, `gain u + bias`, is then `g gain` and `b0 + g bias`. A short form that says all of it stays; else it becomes
-//! `<general>`.
+//! MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms. Its
+//! force is `g w + b0 + b1 q + b2 v`, `w` the command after its range, its delay and its filter. A
+//! scaled and shifted command, `gain u + bias`, becomes `g gain` and `b0 + g bias`. A short form
+//! that can express all of it stays; else it becomes `<general>`.
 
 use asid_core::Target;
 use asid_core::error::Result;
@@ -61,12 +61,12 @@ impl Writer<'_, '_> {
         let declared = self
             .model
             .nominal(&Target::new("actuator", name, "gear", 0))?;
-        // Gain of the actuator and the bias' slopes in position and speed.
+        // Gain of the actuator, and slopes of its bias in position and speed.
         let (gain, slopes) = match drive.law {
             DriveLaw::Motor => (drive.gear / declared, None),
             DriveLaw::Position { .. } => {
                 let kp = self.value(&Target::new("actuator", name, "kp", 0))?;
-                // An engine has no `kv` of a servo that has none.
+                // An engine has no `kv` of a servo without one.
                 let kv = match kv {
                     Some(kv) => kv,
                     None => self
@@ -107,7 +107,7 @@ impl Writer<'_, '_> {
                 node,
                 limit / gear.abs(),
                 drive.force_range.filter(|_| {
-                    // Limits of a motor with a gain are kept before it.
+                    // The drive has the limits of a motor with a gain before that gain.
                     !matches!(drive.law, DriveLaw::Motor) || drive.gear == declared
                 }),
             );
@@ -115,7 +115,7 @@ impl Writer<'_, '_> {
         Ok(())
     }
 
-    /// The long form with all numbers said.
+    /// Writes the long form, with all numbers explicit.
     fn write_general(
         &mut self,
         i: usize,
@@ -153,7 +153,7 @@ impl Writer<'_, '_> {
         self.markup.set(node, "interp", "linear");
     }
 
-    /// The narrower of the limits that a drive has and one before the gear.
+    /// Writes the narrower of a drive's own limits and `limit`, both before the gear.
     fn write_limit(&mut self, node: Node<'_, '_>, limit: f64, has: Option<[f64; 2]>) {
         let [low, high] = has.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let range = [low.max(-limit), high.min(limit)];

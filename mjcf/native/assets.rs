@@ -1,11 +1,11 @@
-//! Where a document finds its meshes and textures from another folder.
+//! Paths from another folder to a document's meshes and textures.
 
 use std::path::{Component, Path, PathBuf};
 
 use super::Writer;
 
 impl Writer<'_, '_> {
-    /// Lets the compiler look for assets where the scene has them.
+    /// Sets the compiler's asset folders to where the scene has its assets.
     pub(super) fn write_assets(&mut self, folder: &Path) {
         let Some(home) = self.scene.directory() else {
             return;
@@ -32,14 +32,15 @@ impl Writer<'_, '_> {
     }
 }
 
-/// The way from a folder to a file or another folder: up and down, or the whole path where they share nothing. The folder need
-/// not exist yet.
+/// The relative path from a folder to a file or another folder.
+///
+/// It is the whole path where the two share nothing. The folder need not exist yet.
 #[must_use]
 pub fn way(folder: &Path, to: &Path) -> PathBuf {
     relative(&absolute(folder), &absolute(to))
 }
 
-/// A path from the root of the file system, links resolved as far as it exists.
+/// The absolute path, with links resolved as far as it exists.
 fn absolute(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() {
         Path::new(".")
@@ -49,14 +50,14 @@ fn absolute(path: &Path) -> PathBuf {
     if let Ok(found) = path.canonicalize() {
         return found;
     }
-    // What is to be made lies in what there is.
+    // A missing entry lies in a folder that exists.
     match (path.parent(), path.file_name()) {
         (Some(parent), Some(name)) if parent != path => absolute(parent).join(name),
         _ => std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
     }
 }
 
-/// The way from one folder to another, both absolute.
+/// The relative path from one absolute folder to another.
 fn relative(from: &Path, to: &Path) -> PathBuf {
     let (a, b): (Vec<Component<'_>>, Vec<Component<'_>>) =
         (from.components().collect(), to.components().collect());

@@ -1,12 +1,13 @@
-//! The elements of a document in the order of the layout.
+//! The elements of a document, in the order of the layout.
 
 use asid_core::Scene;
 use asid_core::error::{Error, Result};
 use asid_core::layout::Layout;
 use roxmltree::{Document, Node};
 
-/// Samples that a history of commands or readings has beyond its delay: the interpolation reaches one to
-/// either side, and a cubic two.
+/// Samples of a history of commands or readings beyond its delay.
+///
+/// Linear interpolation needs one more to either side, and a cubic two.
 pub const HISTORY_MARGIN: f64 = 3.0;
 
 /// Elements by their index in a layout.
@@ -29,14 +30,14 @@ pub struct Elements<'d> {
     pub sensors: Vec<Node<'d, 'd>>,
 }
 
-/// Elements that stand for others.
+/// Elements that generate others.
 const GENERATORS: [&str; 5] = ["replicate", "composite", "flexcomp", "attach", "model"];
 
 impl<'d> Elements<'d> {
-    /// Finds them.
+    /// Finds the elements.
     ///
     /// # Errors
-    /// When the document does not hold each element of the layout itself.
+    /// When the document does not contain each element of the layout itself.
     pub fn find(scene: &Scene, document: &'d Document<'d>, layout: &Layout) -> Result<Self> {
         let root = document.root_element();
         let sections = |tag: &'static str| {
@@ -61,7 +62,7 @@ impl<'d> Elements<'d> {
         if let Some(first) = worlds.first() {
             found.bodies.push(*first);
         }
-        // The world's own parts come first, whichever of its sections they stand in.
+        // The world's own elements come first, whichever of its sections they are in.
         let mut below = Vec::new();
         for world in &worlds {
             found.parts(*world, &mut below);
@@ -95,7 +96,7 @@ impl<'d> Elements<'d> {
         Ok(found)
     }
 
-    /// Takes a body, and the bodies below it.
+    /// Adds a body and its descendants.
     fn body(&mut self, node: Node<'d, 'd>) {
         self.bodies.push(node);
         let mut below = Vec::new();
@@ -105,7 +106,7 @@ impl<'d> Elements<'d> {
         }
     }
 
-    /// Takes the geoms and joints of a body, also those inside of frames, and lists its children.
+    /// Adds the geoms and joints of a body, also those inside frames, and lists its child bodies.
     fn parts(&mut self, node: Node<'d, 'd>, below: &mut Vec<Node<'d, 'd>>) {
         for child in node.children() {
             match child.tag_name().name() {
@@ -118,20 +119,20 @@ impl<'d> Elements<'d> {
         }
     }
 
-    /// The value of an attribute of the compiler: the last that is said.
+    /// The value of an attribute of the compiler: the last one in the document.
     pub fn compiler(&self, attribute: &str) -> Option<&'d str> {
         let said = self.compilers.iter().rev();
         said.filter_map(|c| c.attribute(attribute)).next()
     }
 
-    /// Whether some default class gives an attribute to an element.
+    /// Whether any default class sets an attribute of an element.
     pub fn default_has(&self, tag: &str, attribute: &str) -> bool {
         let sections = self.root.children().filter(|n| n.has_tag_name("default"));
         let mut all = sections.flat_map(|s| s.descendants());
         all.any(|n| n.has_tag_name(tag) && n.has_attribute(attribute))
     }
 
-    /// What an angle of the document (rad) is multiplied by: 1, or 180/π where the document counts degrees.
+    /// Unit of the document's angles per rad: 1, or 180/π where the document uses degrees.
     pub fn angle_unit(&self) -> f64 {
         match self.compiler("angle") {
             Some("radian") => 1.0,

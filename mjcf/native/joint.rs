@@ -1,4 +1,4 @@
-//! Joints: damping, dry friction, rotor inertia, springs, limits, axes and anchors.
+//! Writes joints: damping, dry friction, rotor inertia, springs, limits, axes and anchors.
 
 use asid_core::Target;
 use asid_core::error::Result;
@@ -7,8 +7,9 @@ use roxmltree::Node;
 
 use super::{NativeJoint, Spring, Writer};
 
-/// Time constant of the constraint that holds a joint with dry friction, in time steps: the shortest that MuJoCo
-/// takes (`refsafe`). At its default of 20 ms a joint that should stand still glides.
+/// Time constant of the dry friction constraint, in time steps: MuJoCo's shortest (`refsafe`).
+///
+/// At its default of 20 ms a joint that should stand still glides.
 const FRICTION_TIME: f64 = 2.0;
 
 impl Writer<'_, '_> {
@@ -18,7 +19,7 @@ impl Writer<'_, '_> {
             let node = self.elements.joints[i];
             for attribute in ["damping", "stiffness", "armature"] {
                 if let Some(values) = self.entries("joint", &joint.name, attribute, 1)? {
-                    // Behind the first there may be coefficients of higher order.
+                    // Coefficients of higher order may follow the first.
                     let said = node.attribute(attribute).unwrap_or_default();
                     let rest = said.split_whitespace().skip(1);
                     let rest: Vec<f64> = rest.filter_map(|x| x.parse().ok()).collect();

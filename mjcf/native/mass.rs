@@ -1,4 +1,4 @@
-//! Mass properties of bodies: the `<inertial>` that a document has, or what its geoms make.
+//! Writes mass properties of bodies: into their `<inertial>`, or in place of their geoms'.
 
 use asid_core::Target;
 use asid_core::error::Result;
@@ -37,7 +37,7 @@ impl Writer<'_, '_> {
         Ok(())
     }
 
-    /// Changes the element that the body has.
+    /// Changes the body's existing `<inertial>`.
     fn write_inertial(
         &mut self,
         name: &str,
@@ -53,7 +53,7 @@ impl Writer<'_, '_> {
         if let Some(mass) = mass {
             self.markup.set_numbers(node, "mass", &[mass]);
         }
-        // Moments follow the mass unless they are given themselves.
+        // Moments scale with the mass unless they are given themselves.
         let mut factors = [scale; 3];
         let mut now = [0.0; 3];
         for (k, factor) in factors.iter_mut().enumerate() {
@@ -84,7 +84,7 @@ impl Writer<'_, '_> {
         Ok(())
     }
 
-    /// Gives the body an `<inertial>` in place of what its geoms make.
+    /// Adds an `<inertial>` to the body that replaces the mass properties of its geoms.
     fn write_inertial_of_geoms(
         &mut self,
         i: usize,
@@ -131,7 +131,7 @@ impl Writer<'_, '_> {
             now.center += Vector3::from_column_slice(&center) - was.center;
         }
         if let Some(moments) = moments {
-            // By their place in the order of size: the largest of the one is the largest of the other.
+            // Match moments by size: the largest of one is the largest of the other.
             let old =
                 [0, 1, 2].map(|k| self.model.nominal(&Target::new("body", name, "inertia", k)));
             let mut factors = Vec::with_capacity(3);
@@ -164,7 +164,7 @@ impl Writer<'_, '_> {
     }
 }
 
-/// The tensor along the same axes with other moments, the largest first.
+/// The tensor with the same axes and other moments, matched by size.
 fn with_moments(tensor: &Matrix3<f64>, moments: [f64; 3]) -> Matrix3<f64> {
     let eigen = SymmetricEigen::new(*tensor);
     let mut order = [0, 1, 2];

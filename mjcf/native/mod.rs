@@ -1,9 +1,9 @@
-//! Values and effects written back into a plain MJCF document.
+//! Writes values and effects back into a plain MJCF document.
 //!
-//! A [`NativeModel`] collects what a document is to say: values of targets, and what effects ask of actuators, joints,
-//! bodies and sensors. [`NativeModel::write`] writes it with MJCF's own elements and attributes, so that any program that
-//! loads MJCF simulates it. Elements are changed in place ([`crate::markup`]); what cannot be said is told
-//! in one sentence each, and left out.
+//! A [`NativeModel`] collects the content: values of targets, and what effects require of
+//! actuators, joints, bodies and sensors. [`NativeModel::write`] writes it with MJCF's own elements
+//! and attributes, so that any program that loads MJCF can simulate it. Elements are changed in
+//! place ([`crate::markup`]). What MJCF cannot express is left out and reported, one sentence each.
 
 mod actuator;
 mod assets;
@@ -24,12 +24,12 @@ use crate::markup::Markup;
 pub use assets::way;
 use elements::Elements;
 
-/// What an actuator does with its command, beside its gains.
+/// Changes of an actuator's command and force, beside its gains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NativeActuator {
     /// Factor of the command, after the command's range.
     pub gain: f64,
-    /// Added to the command, in its unit.
+    /// Offset of the command, in its unit.
     pub bias: f64,
     /// Pure delay of the command, s.
     pub delay: f64,
@@ -56,35 +56,35 @@ impl Default for NativeActuator {
 pub struct Spring {
     /// N m/rad or N/m.
     pub stiffness: f64,
-    /// Where it pulls nowhere, rad or m.
+    /// Position without force, rad or m.
     pub rest: f64,
     /// N m/rad³ or N/m³.
     pub cubic: f64,
 }
 
-/// What lies between a drive and its joint.
+/// Play and elasticity between a drive and its joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Series {
     /// Play, rad or m from end to end.
     pub gap: f64,
     /// Compliance, rad/(N m) or m/N.
     pub compliance: f64,
-    /// Damping ratio of the rotor on the compliance.
+    /// Damping ratio of the rotor's swing on the compliance.
     pub loss: f64,
 }
 
-/// What a joint has beside its own attributes.
+/// Additions to a joint, beside its own attributes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NativeJoint {
     /// Dry friction to add, N or N m.
     pub friction: f64,
     /// Springs to add.
     pub springs: Vec<Spring>,
-    /// Between it and its drive.
+    /// Play or elasticity between it and its drive.
     pub series: Option<Series>,
 }
 
-/// What a document is to say.
+/// The content of a document to be written.
 #[derive(Clone, Debug)]
 pub struct NativeModel<'p> {
     /// The machine.
@@ -93,7 +93,7 @@ pub struct NativeModel<'p> {
     pub values: Vec<(Target, f64)>,
     actuators: BTreeMap<usize, NativeActuator>,
     joints: BTreeMap<usize, NativeJoint>,
-    /// Share of a body's weight that is carried, to add.
+    /// Share of a body's weight that is compensated, to add.
     gravity_compensation: BTreeMap<usize, f64>,
     /// Delays of sensors, s.
     sensor_delays: BTreeMap<usize, f64>,
@@ -102,14 +102,14 @@ pub struct NativeModel<'p> {
 /// A document that was written.
 #[derive(Clone, Debug)]
 pub struct Written {
-    /// The document.
+    /// Its text.
     pub xml: String,
-    /// What it does not say, a sentence each.
+    /// What it leaves out, a sentence each.
     pub left_out: Vec<String>,
 }
 
 impl<'p> NativeModel<'p> {
-    /// The machine as it is.
+    /// The machine without changes.
     #[must_use]
     pub fn new(plant: &'p Plant) -> Self {
         Self {
@@ -122,7 +122,7 @@ impl<'p> NativeModel<'p> {
         }
     }
 
-    /// What an actuator is to do.
+    /// Additions to an actuator.
     ///
     /// # Errors
     /// When there is no such actuator.
@@ -131,7 +131,7 @@ impl<'p> NativeModel<'p> {
         Ok(self.actuators.entry(index).or_default())
     }
 
-    /// What a joint is to have.
+    /// Additions to a joint.
     ///
     /// # Errors
     /// When there is no such joint.
@@ -142,7 +142,7 @@ impl<'p> NativeModel<'p> {
         Ok(self.joints.entry(index).or_default())
     }
 
-    /// Adds to the share of a body's weight that is carried (`gravcomp`).
+    /// Adds to the share of a body's weight that is compensated (`gravcomp`).
     ///
     /// # Errors
     /// When there is no such body.
@@ -152,7 +152,7 @@ impl<'p> NativeModel<'p> {
         Ok(())
     }
 
-    /// Delays a sensor's reading, s.
+    /// Adds a delay (s) to a sensor's reading.
     ///
     /// # Errors
     /// When there is no such sensor.
@@ -164,12 +164,13 @@ impl<'p> NativeModel<'p> {
         Ok(())
     }
 
-    /// Writes the document for a folder, from which its assets are found where they are. `model` is the compiled
-    /// scene without values or effects.
+    /// Writes the document for a folder, with paths from there to the scene's assets.
+    ///
+    /// `model` is the compiled scene without values or effects.
     ///
     /// # Errors
-    /// When the document holds elements that others are made from (`replicate`, `composite`, `attach`), or a value is
-    /// of nothing in it.
+    /// When the document has elements that generate others (`replicate`, `composite`, `attach`), or
+    /// a value has no target in it.
     pub fn write(&self, scene: &Scene, model: &dyn Model, folder: &Path) -> Result<Written> {
         let parse = |e: roxmltree::Error| Error::Scene {
             scene: scene.name().to_owned(),
@@ -211,7 +212,7 @@ struct Writer<'w, 'd> {
 }
 
 impl Writer<'_, '_> {
-    /// The value that is asked for, where one is and it is not what the document says.
+    /// The requested value of a target, if there is one and it differs from the document's.
     fn changed(&self, target: &Target) -> Result<Option<f64>> {
         let found = self.native.values.iter().find(|(t, _)| t == target);
         match found {
@@ -228,7 +229,7 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// The entries of an attribute where one of them is to change.
+    /// The entries of an attribute, if one of them is to change.
     fn entries(
         &self,
         element: &str,
@@ -259,7 +260,7 @@ impl Writer<'_, '_> {
             .map(Some)
     }
 
-    /// Says what the document does not.
+    /// Reports what the document leaves out.
     fn leave_out(&mut self, sentence: String) {
         self.left_out.push(sentence);
     }

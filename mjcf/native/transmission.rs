@@ -1,9 +1,10 @@
-//! Play and elasticity between a drive and its joint: MJCF's pattern of two joints.
+//! Writes play and elasticity between a drive and its joint as two joints in MJCF.
 //!
-//! The joint that the drive acts on keeps its name and is now the rotor's; behind it, in the same body and about the
-//! same axis, stands a joint of the link against the rotor: free within a `range` as wide as the gap, or held by a
-//! spring with its damper. What belongs to the sum of the two (damping, dry friction, the joint's own range, what its
-//! sensors read) moves to a fixed tendon over both.
+//! The joint that the drive acts on keeps its name and becomes the rotor's. A second joint follows,
+//! in the same body and about the same axis: the link's against the rotor. It is free within a
+//! `range` as wide as the gap, or held by a spring with its damper. Properties of the sum of the
+//! two (damping, dry friction, the joint's own range, its sensors) move to a fixed tendon over
+//! both.
 
 use asid_core::Target;
 use asid_core::error::Result;
@@ -57,7 +58,8 @@ impl Writer<'_, '_> {
         let rotor = get(self, "armature")?;
         let mut inertia = rotor;
         if inertia <= 0.0 {
-            // A rotor without inertia follows its servo's law; this much it lags a step behind it.
+            // A rotor without inertia follows its servo's law; this inertia makes it lag by one
+            // step.
             inertia = square * timestep * (kv + kp * timestep);
             self.leave_out(format!(
                 "joint `{name}` has no rotor inertia: {inertia:.3e} is written in its place, which lags the servo by a step"
@@ -118,12 +120,12 @@ impl Writer<'_, '_> {
         ))
     }
 
-    /// The range of the joint as one of the tendon; the joint loses it.
+    /// Moves the range of the joint to the tendon; returns the tendon's attributes.
     fn move_range(&mut self, name: &str, node: Node<'_, '_>) -> Result<String> {
         let limits: Result<Vec<f64>> = (0..2)
             .map(|k| self.value(&Target::new("joint", name, "range", k)))
             .collect();
-        // An engine has no range of a joint that is not limited.
+        // An engine has no range of an unlimited joint.
         let Ok(range) = limits else {
             return Ok(String::new());
         };
@@ -131,7 +133,7 @@ impl Writer<'_, '_> {
         Ok(format!(" limited=\"true\" range=\"{}\"", numbers(&range)))
     }
 
-    /// Lets sensors of the joint read the tendon.
+    /// Makes sensors of the joint read the tendon.
     fn move_sensors(&mut self, joint: usize, joint_node: Node<'_, '_>, name: &str) {
         let own = joint_node.attribute("name").unwrap_or(name);
         for (i, sensor) in self.native.plant.layout.sensors.iter().enumerate() {
@@ -151,7 +153,7 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// Gives the keyframes a place for the link, at the middle of its gap.
+    /// Inserts a coordinate of the link into the keyframes, at the middle of its gap.
     fn widen_keyframes(&mut self, qpos: usize, qvel: usize) {
         let sections = self
             .elements

@@ -1,4 +1,4 @@
-//! Drives: actuators that turn a command into the force on a hinge or slide by a law that can be written down.
+//! Drives: actuators whose force on a hinge or slide follows a simple law of their command.
 
 use mjcf_rs::extras::{Actuator, ActuatorKind};
 
@@ -28,7 +28,7 @@ pub struct Drive {
     pub joint: usize,
     /// Its law, before the gear.
     pub law: DriveLaw,
-    /// Ratio of the joint's force to the actuator's; a motor's gain is in it.
+    /// Ratio of the joint's force to the actuator's; includes a motor's gain.
     pub gear: f64,
     /// Limits of the command.
     pub ctrl_range: Option<[f64; 2]>,
@@ -50,8 +50,9 @@ impl Drive {
         self.gear * within(force, self.force_range)
     }
 
-    /// The command that makes the drive ask for a force on the joint (N or N m), before
-    /// any limit; `None` where no command can.
+    /// The command that makes the drive ask for a force on the joint (N or N m), before any limit.
+    ///
+    /// `None` where no command can.
     #[must_use]
     pub fn command_for(&self, force: f64, position: f64, speed: f64) -> Option<f64> {
         let (q, v) = (self.gear * position, self.gear * speed);
@@ -64,8 +65,10 @@ impl Drive {
         command.is_finite().then_some(command)
     }
 
-    /// The same drive with another value of a target of its actuator (`kp`, `kv`, `gear`, `forcerange`) whose value in the document is
-    /// `nominal`; of another attribute the drive itself.
+    /// The same drive with another value of a target of its actuator.
+    ///
+    /// Targets are `kp`, `kv`, `gear` and `forcerange`; `nominal` is the value in the document.
+    /// Other attributes leave the drive unchanged.
     #[must_use]
     pub fn with(mut self, attribute: &str, index: usize, [nominal, value]: [f64; 2]) -> Self {
         match (attribute, &mut self.law) {
@@ -82,15 +85,17 @@ impl Drive {
         self
     }
 
-    /// Whether its command is a position, which it pursues.
+    /// Whether it is a position servo.
     #[must_use]
     pub fn is_position_servo(&self) -> bool {
         matches!(self.law, DriveLaw::Position { .. })
     }
 }
 
-/// A number within a range, as MuJoCo has it (`mju_clip`): of one that is upside down, as where an unknown moves one end past the other,
-/// the lower end counts first. `f64::clamp` panics there.
+/// Clips a number to a range as MuJoCo does (`mju_clip`).
+///
+/// If an unknown moves one end of the range past the other, the lower end counts first.
+/// `f64::clamp` panics there.
 fn within(x: f64, range: Option<[f64; 2]>) -> f64 {
     match range {
         Some([low, _]) if x < low => low,
@@ -99,21 +104,21 @@ fn within(x: f64, range: Option<[f64; 2]>) -> f64 {
     }
 }
 
-/// The law of an actuator, and the factor that its gain is to the gear; `None` for one that is no plain
-/// drive.
+/// The law of an actuator, and the factor of its gain in the gear; `None` for other laws.
 ///
-/// MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms: its force is
-/// `gain u + b0 + b1 q + b2 v`. A `<general>` one without a state is
+/// MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms. Its
+/// force is `gain u + b0 + b1 q + b2 v`. A `<general>` one without a state is
 ///
 /// - a motor where the bias is none,
 /// - a position servo where `b1 = -gain` and `b0 = 0`, with `kp = gain` and `kv = -b2`,
 /// - a velocity servo where `b2 = -gain` and `b0 = b1 = 0`, with `kv = gain`,
 ///
-/// and no plain drive otherwise, as a servo without gain is none. What a short form leaves out, a default class for `<general>` may have set.
+/// and no plain drive otherwise. A servo without gain is no plain drive either. A default class for
+/// `<general>` may set what a short form leaves out.
 pub(super) fn law(actuator: &Actuator) -> Option<(DriveLaw, f64)> {
     let gain = actuator.gainprm.first().copied().unwrap_or(1.0);
     let bias: [f64; 3] = std::array::from_fn(|i| actuator.biasprm.get(i).copied().unwrap_or(0.0));
-    // Above zero it is a damping ratio: the engine works out the gain, and effects take it from there.
+    // A positive `b2` is a damping ratio: the engine computes the gain, and effects read it there.
     let damping = (-bias[2]).max(0.0);
     let is = |kind: &Option<String>, name: &str, default: bool| {
         kind.as_deref().map_or(default, |k| k == name)
@@ -203,7 +208,10 @@ mod tests {
         }
     }
 
-    /// Symptom: `asid explore` ended in a panic where `--unknown actuator/A/forcerange/0:-1:8` met an upper end of 5. Cause: `f64::clamp`.
+    /// Symptom: a panic of `asid explore` with `--unknown actuator/A/forcerange/0:-1:8` and an
+    /// upper end of 5.
+    ///
+    /// Cause: `f64::clamp`.
     #[test]
     fn limits_of_a_force_that_cross_each_other_make_no_panic() {
         let motor = drive("", r#"<motor joint="j" forcerange="-5 5"/>"#).unwrap();
@@ -214,7 +222,7 @@ mod tests {
         assert!(crossed.force(f64::NAN, 0.0, 0.0).is_nan());
     }
 
-    /// The command of a motor with a gain is force before the gain; its limits hold after it.
+    /// A motor's command is the force before its gain; its limits hold after the gain.
     #[test]
     fn the_gain_of_a_motor_counts_as_gear() {
         let motor = drive(

@@ -1,15 +1,16 @@
-//! How a point of a body moves with the joints.
+//! The Jacobian of a point of a body.
 
 use super::Plant;
 use asid_core::layout::JointKind;
 
-/// Deepest chain of bodies.
+/// Most bodies in a chain: the size of a buffer.
 const MAX_DEPTH: usize = 64;
 
 impl Plant {
-    /// Pose `world_from_body` and Jacobian (`6 x nv`, row-major: linear then angular
-    /// velocity of the body's point `at` per unit of each entry of `qvel`) in a state.
-    /// `jacobian` is overwritten; it has `6 nv` entries.
+    /// Pose `world_from_body` of a body in a state, and the Jacobian of its point `at`.
+    ///
+    /// `jacobian` (`6 x nv`, row-major) receives the point's linear, then angular velocity per unit
+    /// of each entry of `qvel`. It is overwritten; it has `6 nv` entries.
     pub fn point_jacobian(
         &self,
         qpos: &[f64],

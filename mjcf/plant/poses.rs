@@ -1,5 +1,6 @@
-//! Where the bodies of a machine are in a state: forward kinematics of the whole tree, for pictures and for
-//! whatever else must not depend on an engine.
+//! Poses of all bodies in a state: forward kinematics of the whole tree.
+//!
+//! It serves pictures, and everything else that must not depend on an engine.
 
 use asid_core::layout::JointKind;
 use asid_core::signal::unit_quaternion;
@@ -24,7 +25,7 @@ impl Plant {
         all
     }
 
-    /// The pose of a body after one of its joints, whose coordinates `q` begins with.
+    /// The pose of a body after one of its joints; `q` begins with the joint's coordinates.
     fn moved(&self, world: Isometry3<f64>, joint: usize, q: &[f64]) -> Isometry3<f64> {
         let own = &self.joints[joint];
         let anchor = Vector3::from(own.anchor);
@@ -55,7 +56,7 @@ mod tests {
 
     use super::*;
 
-    /// The Jacobian's own chain, which a finite difference checks, says the same.
+    /// Equals the chain of the Jacobian, which a finite difference checks.
     #[test]
     fn all_bodies_are_where_their_chains_end() {
         let xml = r#"<mujoco><compiler angle="radian"/><worldbody>

@@ -12,7 +12,7 @@ use asid_core::layout::{JointKind, Layout};
 use asid_core::scene::Scene;
 
 impl Plant {
-    /// Reads a scene.
+    /// Reads the plant of a scene.
     ///
     /// # Errors
     /// When the document is not valid MJCF.
@@ -115,7 +115,7 @@ impl Plant {
     }
 }
 
-/// The range of a joint that has one coordinate and is limited.
+/// The range of a limited hinge or slide.
 fn range(model: &Document, joint: &Joint) -> Option<[f64; 2]> {
     let scalar = matches!(joint.type_, JointType::Hinge | JointType::Slide);
     let limited = joint
@@ -156,8 +156,10 @@ fn drive(
     })
 }
 
-/// MuJoCo's rules: contact bits in either direction, no contact between a body and what it
-/// is welded to or its parent (unless that is fixed), excluded and explicit pairs.
+/// Pairs of geoms that can touch, by MuJoCo's rules.
+///
+/// Contact bits count in either direction. A body does not touch what it is welded to, nor its
+/// parent (unless that is fixed). Excluded and explicit pairs are applied.
 fn contacts(
     model: &Document,
     layout: &Layout,
