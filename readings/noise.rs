@@ -58,16 +58,17 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
 
 /// Variance of the third differences of white noise of standard deviation 1: 1 + 9 + 9 + 1.
 const WHITE: f64 = 20.0;
-/// Growth over a doubling of the rows from which on differences show the model error: twice the
-/// largest of noise.
+/// Least growth, over a doubling of the rows, at which differences show the model error: twice the
+/// largest growth of noise.
 const SMOOTH: f64 = 4.0;
 /// Growth of a model error over a doubling of the rows: from a rough force, and from a smooth one.
 const RESTS: [f64; 2] = [8.0, 64.0];
 /// Misfit above the best one up to which a smaller correlation is preferred.
 ///
-/// A misfit is a sum of squared logarithms, each times its number of differences. The logarithm of
-/// a squared median of `n` normal magnitudes has the variance `4 / (4 n f(m)^2 m^2) = 5.4 / n`,
-/// with the density `f` of the magnitude at its median `m`. The limit is half of that variance.
+/// A misfit is a sum of squared logarithms, each times its number of differences. Let `f` be the
+/// density of a normal magnitude, and `m` its median. The logarithm of a squared median of `n`
+/// magnitudes has the variance `4 / (4 n f(m)^2 m^2) = 5.4 / n`. The limit is half of that, times
+/// `n`.
 const TIE: f64 = 2.7;
 /// Misfit above the best one up to which a correlation is nearly as likely: the square of two
 /// standard deviations of that logarithm.

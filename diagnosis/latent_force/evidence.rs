@@ -1,9 +1,9 @@
 //! Laplace evidence of a linear regression with normal priors and bounds.
 //!
 //! `X'X` and `X'y` are those of whitened innovations. Coefficients are in prior standard
-//! deviations, with the prior `N(0, 1)`. The log marginal likelihood relative to the model without
-//! the columns is `b'c - c'Ac/2 - ln det A / 2` at the best coefficients `c` within their bounds,
-//! with `A = X'X + I` (MacKay 1992).
+//! deviations, with the prior `N(0, 1)`. Let `A = X'X + I`, and `c` be the best coefficients within
+//! their bounds. The log marginal likelihood relative to the model without the columns is then `b'c
+//! - c'Ac/2 - ln det A / 2` (MacKay 1992).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -4,8 +4,8 @@
 //! A perturbation of one set moves none of the others, so one simulation perturbs each of them.
 //! They are columns of a Jacobian whose rows do not overlap (Curtis, Powell and Reid 1974). Engines
 //! call such sets islands. A kinematic tree is within one island by its structure. Two trees are
-//! one island if a sensor reads both, if their bodies touched in some row of the logs, or if
-//! derivatives show a coupling, as of a tendon or a connection.
+//! one island if a sensor reads both, or if their bodies touched in some row of the logs. They also
+//! are if derivatives show a coupling, as of a tendon or a connection.
 
 use asid_core::layout::JointKind;
 use asid_effects::Reach;

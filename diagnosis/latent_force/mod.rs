@@ -5,15 +5,19 @@
 //! position and speed, estimated by a smoother. Effects are columns of one linear regression on its
 //! innovations. The few leading ones are inserted into the model and fitted.
 //!
-//! From the bottom up: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch) and
-//! [`scatter`] (how far their replays can be repeated), [`step_map`] (the model over a row and its
-//! derivatives), [`smoother`], [`initial`], `one_step` (how derivatives are computed),
-//! [`step_error`] (the engine's own error), [`context`] and [`estimate`] (trajectory, force and
-//! noise), [`fitted_value`] and [`fit`] (a model with its values), [`evidence`], [`trace`],
-//! [`columns`], [`screen`], [`search`], [`selection`], [`detection`] (detection limits),
-//! [`rehearsal`] (what a screening would report for machines like this one), `steps` (encoder
-//! steps), `picture` (what the report draws of the force), `left` (what could be learned of the
-//! rest), [`pipeline`].
+//! From the bottom up:
+//!
+//! - Rows and states: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch) and
+//!   [`scatter`] (how far their replays can be repeated).
+//! - Estimator: [`step_map`] (the model over a row and its derivatives), [`smoother`], [`initial`],
+//!   `one_step` (how derivatives are computed), [`step_error`] (the engine's own error),
+//!   [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a
+//!   model with its values).
+//! - Search: [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
+//!   [`detection`] (detection limits), [`rehearsal`] (what a screening would report for machines
+//!   like this one).
+//! - The rest: `steps` (encoder steps), `picture` (what the report draws of the force), `left`
+//!   (what could be learned of the rest), [`pipeline`].
 
 pub mod columns;
 pub mod context;

@@ -3,8 +3,8 @@
 //! Where a law is missing, the noise model counts its force as chance, and the smoother absorbs
 //! most of it. A slow force, such as that of viscous friction, then hardly shows. With the law in
 //! the model the variance is smaller. So each set of columns gets the scale at which it is most
-//! likely. An effect at one joint lowers the variance there and leaves the variances of other
-//! joints as they are: these contain the many small errors of every machine.
+//! likely. An effect at one joint lowers the variance there and leaves those of other joints as
+//! they are: they contain the many small errors of every machine.
 
 use asid_effects::Reach;
 

@@ -5,7 +5,7 @@
 //! replays are then far apart, and derivatives do not describe them. Initial states are therefore
 //! drawn from the posterior. What their replays do *beyond* the derivatives is the error of the
 //! linearisation. Its covariance is added to that of the readings, as in posterior linearisation
-//! (García-Fernández, Svensson, Morelande and Särkkä 2015). The covariance is of low rank: each
+//! (García-Fernández, Svensson, Morelande and Särkkä 2015). The covariance is of low rank. Each
 //! draw is a direction with a coefficient of its own, `N(0, 1)`, that is projected out together
 //! with the initial state. The change at half the time step is one more direction.
 

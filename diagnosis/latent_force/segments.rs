@@ -1,6 +1,6 @@
 //! Cuts logs into short segments where bodies touch.
 //!
-//! A missing force of any size and direction is no model of a lasting contact: if it presses two
+//! A missing force of any size and direction is no model of a lasting contact. If it presses two
 //! bodies together, any friction force can act between them. So a stretch with contact is cut into
 //! segments. Each is a replay from an initial state of its own (multiple shooting, Bock and Plitt
 //! 1984), and its residuals have a variance of their own. Elsewhere the missing force is smoothed.
@@ -18,9 +18,9 @@ use super::walk::Walk;
 
 /// Durations of segments, s, shortest first.
 ///
-/// The first is a few times a contact's time constant (0.02 s by default in MuJoCo): a few per cent
-/// of a force then move a body by about a sensor's resolution. The second covers a few impacts, the
-/// last a whole stretch of contact.
+/// The first is a few times a contact's time constant (0.02 s by default in MuJoCo). Over it, a few
+/// per cent of a force move a body by about a sensor's resolution. The second covers a few impacts,
+/// the last a whole stretch of contact.
 pub const DURATIONS: [f64; 3] = [0.25, 1.0, f64::INFINITY];
 /// Longest gap between two contacts that joins their stretch, s: its readings show a missing force
 /// as well.

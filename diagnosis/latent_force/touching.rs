@@ -1,8 +1,8 @@
 //! In which rows bodies touch in a way that the motion depends on.
 //!
-//! Many models have bodies that touch all the time and never move relative to each other: an object
-//! that lies on a table beside the arm, a base on its stand. Such a contact only holds what is at
-//! rest anyway. Its rows need no segments.
+//! Many models have bodies that touch all the time and never move relative to each other. Examples
+//! are an object that lies on a table beside the arm, and a base on its stand. Such a contact only
+//! holds what is at rest anyway. Its rows need no segments.
 
 use asid_core::layout::JointKind;
 use asid_mjcf::Plant;

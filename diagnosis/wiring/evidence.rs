@@ -11,7 +11,7 @@
 
 use super::windows::Misses;
 
-/// Thresholds from which on a wiring fault is named.
+/// Thresholds for naming a wiring fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Misses below this share of the motion are those of right wiring, and shrinking them further
@@ -49,7 +49,7 @@ pub struct Settings {
     pub offset: f64,
     /// Smallest delay of a clock, s: smaller ones are effects.
     pub delay: f64,
-    /// Probability from which on a fault is named.
+    /// Lowest probability at which a fault is named.
     pub named: f64,
     /// Probability below which whole replays, and what a diagnosis leaves, decide about a fault.
     ///

@@ -79,7 +79,7 @@ pub struct Search<'a> {
     pub record: &'a [Recorded],
     /// Their columns.
     pub quantities: &'a [Quantity],
-    /// Thresholds from which on a fault is named.
+    /// Thresholds for naming a fault.
     pub settings: &'a Settings,
 }
 

@@ -13,7 +13,7 @@ use super::windows::{Misses, Windows};
 /// Gauss-Newton steps. Misses are nearly linear in an offset over a window; an initial value
 /// several motions away takes some.
 const STEPS: usize = 4;
-/// Residual, in motions, from which on the loss is linear (Huber's loss): some windows contain
+/// Residual, in motions, above which the loss is linear (Huber's loss): some windows contain
 /// contacts.
 const HUBER: f64 = 1.0;
 /// Halvings of a step that does not lower the loss.
