@@ -1,4 +1,4 @@
-//! A diagnosis of logs whose wiring is in order: what the machine does that its model does not.
+//! A diagnosis of logs with correct wiring: what the machine does that its model does not.
 
 use asid_core::{Progress, Result};
 
@@ -22,7 +22,7 @@ pub(crate) fn diagnose_physics(
     tell(study, work, settings, progress)
 }
 
-/// Tells what was found.
+/// Turns what was found into a result.
 fn tell(
     study: &Study,
     work: Work,

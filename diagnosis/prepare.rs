@@ -18,10 +18,10 @@ use crate::starts::reach::reach;
 use crate::starts::{given_start, open_coordinates};
 use crate::study::Study;
 
-/// Share of a held-out episode that an open start is fitted on.
+/// Share of a held-out episode on which an unknown initial state is fitted.
 const HEAD: f64 = 0.1;
 
-/// Sensors that some of the logs have, in the scene's order.
+/// Returns the sensors with readings in at least one log, in the scene's order.
 fn logged_sensors(layout: &Layout, study: &Study) -> Vec<String> {
     let episodes = || study.train.iter().chain(&study.test);
     layout
@@ -39,8 +39,8 @@ fn logged_sensors(layout: &Layout, study: &Study) -> Vec<String> {
         .collect()
 }
 
-/// Residuals `logged - predicted` without whitening, in the sensors' units, one array an
-/// episode.
+/// Returns the residuals `logged - predicted` without whitening, in the sensors' units, one array
+/// per episode.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -63,7 +63,8 @@ pub fn plain_residuals(
         .collect())
 }
 
-/// Sensors whose reading in the first row of a log follows a command before it, which no model can predict.
+/// Returns the sensors whose reading in the first row of a log follows an earlier command, so that
+/// no model can predict it.
 fn followers(machine: &Machine, study: &Study) -> Result<Followers> {
     let Some((_, episode)) = study.train.first() else {
         return Ok(Followers::default());
@@ -72,9 +73,11 @@ fn followers(machine: &Machine, study: &Study) -> Result<Followers> {
     Followers::of(&*machine.with(&[])?, &InitialState { qpos, qvel }, episode)
 }
 
-/// The bench of a study with its noise still open, and the values of its parameters in the model
-/// as given. Where a log does not give its start the machine begins at its home, or where it comes to rest from there, if replays of the first rows leave
-/// less then.
+/// Returns the bench of a study, with its noise not yet estimated, and the values of its parameters
+/// in the model as given.
+///
+/// Where a log gives no initial state, the machine begins at its home, or at rest near it if
+/// replays of the first rows from there leave less.
 ///
 /// # Errors
 /// When no log has a reading, or a parameter cannot be set.
@@ -86,12 +89,13 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     };
     let (other, _) = dataset_of(study, machine)?;
     let [before, after] = [&bench, &other].map(|b| left_of_first_rows(b, &nominal));
-    // Replays that diverge are not better than anything.
+    // Replays that diverge are never better.
     let bench = if after? < before? { other } else { bench };
     Ok((bench, nominal))
 }
 
-/// The machine at rest under the first command of the first log, where it comes to rest and some log leaves its start open.
+/// Returns the machine at rest under the first command of the first log, if it comes to rest and a
+/// log gives no complete initial state.
 fn settled(study: &Study, machine: &Machine) -> Result<Option<Machine>> {
     let logs = || study.train.iter().chain(&study.test);
     let (Some((_, first)), Some(home)) =
@@ -108,8 +112,10 @@ fn settled(study: &Study, machine: &Machine) -> Result<Option<Machine>> {
     Ok(found.map(|home| machine.beginning_at(home)))
 }
 
-/// Squared residuals of the first rows of the training logs that replays leave, in units of what the readings alone tell of the noise; infinite where one
+/// Returns the squared residuals of replays of the training logs' first rows; infinite where one
 /// diverges.
+///
+/// They are in units of the noise that the readings alone show.
 fn left_of_first_rows(bench: &Bench, nominal: &[f64]) -> Result<f64> {
     let mut head = bench.train.cut(bench.layout(), HEAD);
     let noise: Vec<f64> = reading_noise(&bench.train.logs)
@@ -126,7 +132,7 @@ fn left_of_first_rows(bench: &Bench, nominal: &[f64]) -> Result<f64> {
     Ok(if left.is_nan() { f64::INFINITY } else { left })
 }
 
-/// The same of a machine that begins where it does.
+/// Returns the bench of a study and the values of its parameters, for a machine with a given home.
 fn dataset_of(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
@@ -175,7 +181,7 @@ fn dataset_of(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     Ok((bench, nominal))
 }
 
-/// Noise of each sensor from the readings alone, without a model.
+/// Estimates the noise of each sensor from the readings alone, without a model.
 #[must_use]
 pub fn reading_noise(logs: &Logs) -> Vec<Noise> {
     let n = logs.entries.len();
@@ -186,7 +192,8 @@ pub fn reading_noise(logs: &Logs) -> Vec<Noise> {
         .map(|e| {
             let rows = e.plan.rows();
             let mut out = vec![0.0; rows * n];
-            // Of each column the first reading that is there: any fixed one takes the place of the start.
+            // The first valid reading of each column: any fixed reading can take the place of the
+            // initial one.
             let first: Vec<f64> = (0..width)
                 .map(|c| {
                     let mut column = e.readings.iter().skip(c).step_by(width);
@@ -202,7 +209,8 @@ pub fn reading_noise(logs: &Logs) -> Vec<Noise> {
     noise::describe(logs, &series)
 }
 
-/// Estimates the noise from the readings alone; what the study gives stays, and is white.
+/// Estimates the noise from the readings alone; where the study gives it, that value is used and
+/// counts as white.
 pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
     let logs = &bench.train.logs;
     let estimated = reading_noise(logs);
@@ -211,7 +219,7 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
         .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x.deviation))
         .collect();
     bench.set_noise(&noise);
-    // A study that gives the noise of a sensor gives all of it.
+    // The noise that a study gives for a sensor is all of its noise.
     let alike = |(sensor, x): (&LoggedSensor, &Noise)| {
         if given.contains_key(&sensor.name) {
             1.0

@@ -5,13 +5,13 @@ use asid_results::naming::grouped;
 use crate::findings::Repeats;
 use crate::result::{DiagnosisResult, Kind};
 
-/// Share of the gap from which on what is left beside a verdict is worth a word in the sentence.
+/// Share of the gap from which on what is left beside a verdict is mentioned in the sentence.
 const WORTH_A_WORD: f64 = 0.05;
 
-/// Gap on the logs held out up to which it is that of the noise: its deviation is estimated.
+/// Gap on the held-out logs up to which it counts as noise, whose standard deviation is estimated.
 const OF_NOISE: f64 = 1.2;
 
-/// That the study's parameters are fitted, as a part of a sentence; empty where it has none.
+/// Says that the study's parameters are fitted, as a part of a sentence; empty if it has none.
 fn once_fitted(result: &DiagnosisResult) -> &'static str {
     if result.parameters.is_empty() {
         ""
@@ -20,7 +20,8 @@ fn once_fitted(result: &DiagnosisResult) -> &'static str {
     }
 }
 
-/// Where no effect is missing; `beyond` is the gap beyond what the starts of the logs held out leave open.
+/// The sentence for a verdict without a missing effect; `beyond` is the gap that no choice of the
+/// held-out logs' initial states removes.
 fn none(result: &DiagnosisResult, beyond: f64, repeats: Option<Repeats>) -> String {
     let (gap, fitted) = (result.gap.identified, once_fitted(result));
     if gap <= OF_NOISE {
@@ -43,7 +44,7 @@ fn none(result: &DiagnosisResult, beyond: f64, repeats: Option<Repeats>) -> Stri
     )
 }
 
-/// What was fitted within its tolerance, law by law; `None` where nothing was.
+/// Lists what was fitted within its tolerance, law by law; `None` if nothing was.
 fn within_tolerance(result: &DiagnosisResult) -> Option<String> {
     let mut laws: Vec<&str> = result.tolerances.iter().map(|t| &*t.effect).collect();
     laws.sort_unstable();
@@ -67,11 +68,11 @@ pub struct Training {
     pub none: f64,
     /// With the best explanation.
     pub best: f64,
-    /// Whether the logs held out have none.
+    /// Whether the held-out logs have none.
     pub alone: bool,
 }
 
-/// How much of the gap is closed, with its interval.
+/// Says how much of the gap is closed, with its interval.
 fn part_closed(result: &DiagnosisResult, training: Training) -> String {
     if training.alone {
         let Training { none, best, .. } = training;
@@ -90,7 +91,7 @@ fn part_closed(result: &DiagnosisResult, training: Training) -> String {
     }
 }
 
-/// What is left beside the effects that are named; empty where it is little.
+/// Says what is left beside the named effects; empty if it is little.
 fn beside(result: &DiagnosisResult) -> String {
     let remainder = result.verdict.remainder.as_ref();
     remainder
@@ -104,7 +105,8 @@ fn beside(result: &DiagnosisResult) -> String {
         })
 }
 
-/// That a named cause is less probable than not, where no rival says so; empty where it is not.
+/// Says that a named cause is less probable than not, if no rival says so already; empty if it is
+/// not.
 fn doubt(result: &DiagnosisResult) -> String {
     let p = result.verdict.probability;
     if p >= 0.5 || !result.verdict.ambiguous_with.is_empty() {
@@ -116,7 +118,7 @@ fn doubt(result: &DiagnosisResult) -> String {
     )
 }
 
-/// Where most of the gap is, as the beginning of a sentence; empty where no place is known.
+/// Says where most of the gap is, as the beginning of a sentence; empty if no place is known.
 fn place(result: &DiagnosisResult) -> String {
     result.places.first().map_or_else(String::new, |w| {
         let condition = w
@@ -132,7 +134,7 @@ fn place(result: &DiagnosisResult) -> String {
     })
 }
 
-/// That a check failed; empty where none did.
+/// Says that a check failed; empty if none did.
 fn caution(result: &DiagnosisResult) -> String {
     let failed = result.checks.iter().filter(|c| !c.ok);
     let failed: Vec<&str> = failed.map(|c| &*c.check).collect();
@@ -143,7 +145,7 @@ fn caution(result: &DiagnosisResult) -> String {
     format!(" But a check failed ({failed}): see there first.")
 }
 
-/// Where what an ordinary machine has of everything makes up for the gap.
+/// The sentence for tolerances that make up for the gap.
 fn tolerances(result: &DiagnosisResult) -> String {
     format!(
         "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out. One of them may still be its cause ({} that none is).",
@@ -155,7 +157,7 @@ fn tolerances(result: &DiagnosisResult) -> String {
     )
 }
 
-/// Where effects are named.
+/// The sentence for a verdict that names effects.
 fn effects(result: &DiagnosisResult, training: Training) -> String {
     let sets = result.verdict.ambiguous_with.iter();
     let rivals: Vec<String> = sets.map(|s| grouped(s).join(" + ")).collect();
@@ -176,7 +178,8 @@ fn effects(result: &DiagnosisResult, training: Training) -> String {
     )
 }
 
-/// Where nothing in the catalogue explains the gap; `labels` come nearest and leave `rest`.
+/// The sentence for a gap that nothing in the catalogue explains; `labels` come closest and leave
+/// `rest`.
 fn unknown(
     result: &DiagnosisResult,
     (labels, rest): (&[String], Option<&str>),
@@ -210,10 +213,12 @@ fn unknown(
     }
 }
 
-/// Says what a result means, in one sentence; `labels` are the effects of the best
-/// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, `repeats` how far contacts can be
-/// repeated, `beyond` the gap without effects beyond what the starts of the logs held out leave open, and `training` those of the logs
-/// fitted to.
+/// Says what a result means, in one sentence.
+///
+/// `labels` are the effects of the best explanation, whether or not it is the verdict, and `rest`
+/// is what they leave, if known. `repeats` is how well contacts can be repeated. `beyond` is the
+/// gap without effects that no choice of the held-out logs' initial states removes. `training` are
+/// the gaps of the training logs.
 #[must_use]
 pub fn sentence(
     result: &DiagnosisResult,

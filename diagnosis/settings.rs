@@ -1,4 +1,4 @@
-//! What a user may set of a diagnosis.
+//! Settings of a diagnosis that a user may change.
 
 mod breadth;
 
@@ -7,10 +7,10 @@ pub use breadth::{Breadth, FALSE_ALARMS};
 /// Settings of a diagnosis.
 #[derive(Clone, Debug, Default)]
 pub struct Settings {
-    /// How widely to search, with the seed of all chance and the rate of false alarms.
+    /// How widely to search, with the random seed and the rate of false alarms.
     pub breadth: Breadth,
-    /// Effects of the catalogue that are left out, by name.
+    /// Names of effects of the catalogue that are left out.
     pub without: Vec<String>,
-    /// Whether the diagnosis is repeated on simulated logs for as long as there is time.
+    /// Whether the diagnosis is repeated on simulated logs until the time runs out.
     pub calibrate: bool,
 }

@@ -1,12 +1,17 @@
-//! What readings leave about their own mean: what a replay must beat to have any skill.
+//! Mean square of readings about their own mean: what a replay must beat to have any skill.
 //!
-//! An effect that quiets a machine may come nearer to readings that do not follow the commands at all. Such a replay predicts nothing: the mean
-//! of the log does as well. A replay has skill where it leaves less than the mean does (the skill score of Murphy 1988, doi:10.1175/1520-0493(1988)116<2417:SSBOTM>2.0.CO;2).
+//! An effect that quiets a machine may bring replays closer to readings that do not follow the
+//! commands at all. Such a replay predicts nothing: the mean of the log does as well. A replay has
+//! skill if it leaves less than the mean does (the skill score of Murphy 1988,
+//! doi:10.1175/1520-0493(1988)116<2417:SSBOTM>2.0.CO;2).
 
 use crate::data::Logs;
 
-/// Mean square of the readings about their mean over each log, in units of the noise; NaN without readings.
-/// Readings are taken from each sensor's first one of the log, so that an orientation's are rotation vectors.
+/// Returns the mean square of the readings about their mean over each log, in units of the noise;
+/// NaN without readings.
+///
+/// Readings are taken relative to the first of their sensor in the log, so that those of an
+/// orientation are rotation vectors.
 #[must_use]
 pub fn about_the_mean(logs: &Logs) -> f64 {
     let (width, entries, noise) = (logs.width(), logs.entries.len(), logs.entry_noise());
@@ -48,7 +53,7 @@ mod tests {
         ];
         let mut logs = Logs::new(&plant(), &["place".to_owned()], episodes).unwrap();
         logs.set_noise(&[0.5]);
-        // 4 + 0 + 4 of the first log over 0.5 squared, by seven readings.
+        // 4 + 0 + 4 of the first log over 0.5 squared, divided by seven readings.
         assert!((about_the_mean(&logs) - 8.0 / 0.25 / 7.0).abs() < 1e-12);
     }
 }

@@ -1,4 +1,5 @@
-//! Where episodes begin: as their logs say, as their first readings show, and what neither tells.
+//! Initial states of episodes: what their logs give, what their first readings show, and which
+//! coordinates stay unknown.
 
 pub(crate) mod reach;
 
@@ -12,8 +13,8 @@ use asid_mjcf::plant::Reads;
 use crate::predict::State;
 use crate::study::Study;
 
-/// The start of an episode as the log has it; the rest as its first readings say, or from
-/// the scene's own start.
+/// Returns the initial state of an episode: as its log gives it, else from its first readings, else
+/// from the scene.
 pub fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
     let layout = &plant.layout;
     let (mut qpos, mut qvel) = home(layout);
@@ -24,7 +25,7 @@ pub fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
                 *x = *given;
             }
         }
-        // Some components given and others read are no unit quaternion yet.
+        // A mixture of given and read components is not a unit quaternion yet.
         for joint in &layout.joints {
             let first = match joint.kind {
                 JointKind::Free => joint.qpos + 3,
@@ -43,13 +44,13 @@ pub fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
     State { qpos, qvel }
 }
 
-/// Rows that a velocity is first taken over.
+/// Number of rows over which a first velocity is taken.
 const FIRST_ROWS: usize = 6;
 
-/// Sets what sensors of joints and of free bodies say of the start.
+/// Sets what sensors of joints and of free bodies read of the initial state.
 fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64], qvel: &mut [f64]) {
     let layout = &plant.layout;
-    // First present row of a sensor and one a little later, with the time between.
+    // The first row with a reading of a sensor and one a little later, with the time between.
     let seen = |sensor: &str| -> Option<(Vec<f64>, Vec<f64>, f64)> {
         let range = episode.channel(sensor)?;
         let whole = |k: &usize| {
@@ -114,7 +115,7 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
             Reads::Other => {}
         }
     }
-    // A speed that is measured is better than a difference.
+    // A measured speed is better than a difference.
     for (i, sensor) in layout.sensors.iter().enumerate() {
         if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
             && let Some((first, ..)) = seen(&sensor.name)
@@ -124,8 +125,10 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
     }
 }
 
-/// Which degrees of freedom of a joint the values of its position that are missing leave open:
-/// of a quaternion the axes of the components that are, all where that is no single axis.
+/// Returns the degrees of freedom of a joint that the missing values of its position leave unknown.
+///
+/// Of a quaternion these are the axes of the missing components; all axes if that is not a single
+/// one.
 fn open_places(kind: JointKind, places: &[f64]) -> Vec<usize> {
     let missing = |i: usize| !places[i].is_finite();
     let turn = |first: usize, axes: std::ops::Range<usize>| -> Vec<usize> {
@@ -150,7 +153,8 @@ fn open_places(kind: JointKind, places: &[f64]) -> Vec<usize> {
     }
 }
 
-/// Coordinates of the starts (`nv` positions, then `nv` velocities) that some log leaves open.
+/// Returns the coordinates of the initial states (`nv` positions, then `nv` velocities) that at
+/// least one log does not give.
 pub(crate) fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
     let nv = layout.nv;
     let mut open = vec![false; 2 * nv];

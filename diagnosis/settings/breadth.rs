@@ -1,36 +1,41 @@
 //! How widely a search looks.
 
-/// Rate of false alarms that decisions are made at where none is stated: what is read as "not by chance" in the field.
+/// Default rate of false alarms of all decisions: what the field reads as "not by chance".
 pub const FALSE_ALARMS: f64 = 0.01;
 
-/// How widely to search.
+/// How widely a search looks.
 #[derive(Clone, Copy, Debug)]
 pub struct Breadth {
-    /// Share of the power of all that is missing without effects that a further effect must make up for: one that earns
-    /// evidence and leaves the force as it was mends the noise model, and one that makes up for little is among the many
-    /// small things by which any machine differs from its model. 0.04 is a fifth of the force.
+    /// Share of the power of what is missing without effects that a further effect must make up
+    /// for; 0.04 is a fifth of the force.
+    ///
+    /// An effect that earns evidence and leaves the force as it was improves the noise model only.
+    /// One that makes up for little is among the many small things by which any machine differs
+    /// from its model.
     pub shrinks: f64,
-    /// Probability with which chance alone would earn an effect its place, over all candidates.
+    /// Probability with which chance alone would add an effect, over all candidates.
     pub false_alarms: f64,
-    /// Sets that are fitted a little after each screening.
+    /// Number of sets that get a short fit after each screening.
     pub raced: usize,
     /// Share of the leader's evidence that a set needs to be raced.
     pub share: f64,
-    /// Evidence in screening below which nothing is raced, natural logarithm: the best of a hundred candidates reaches 3 to
-    /// 5 by chance.
+    /// Screened evidence below which nothing is raced, a natural logarithm: the best of a hundred
+    /// candidates reaches 3 to 5 by chance.
     pub least: f64,
-    /// Share of the gain that the best has reached up to which a set may lie behind it after the short fits, and the evidence
-    /// up to which it may in any case.
+    /// How far a set may be behind the best after the short fits, as a share of the gain of the
+    /// best.
+    ///
+    /// A set within `near` of the best, in evidence, stays in any case.
     pub behind: f64,
     /// See `behind`.
     pub near: f64,
-    /// Sets of these that are fitted to the end.
+    /// Number of raced sets that are fitted to the end.
     pub finished: usize,
-    /// Most sets that are named one upon the other.
+    /// Maximum number of rounds, each of which may add a set to those named.
     pub depth: usize,
-    /// Linearisations of a first short fit, and of a whole one.
+    /// Linearisations of a short fit, and of a whole one.
     pub rounds: [usize; 2],
-    /// Seed of all chance.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 

@@ -1,9 +1,10 @@
-//! How far a start may lie from where it is first put, coordinate by coordinate.
+//! How far each coordinate of an initial state may lie from its first guess.
 //!
-//! A coordinate that the readings hardly show, such as the spin of a ball about the normal of the floor it touches, has a slope that is next to
-//! nothing, and a step of least squares along it is next to endless: ten thousand rad/s, after which the replay has nothing to do with the log.
-//! So each coordinate steps against a normal prior whose deviation is twice the largest value that it takes while the model replays the logs, about
-//! whichever axis of its joint.
+//! The readings hardly show some coordinates, such as the spin of a ball about the normal of the
+//! floor that it touches. The derivative by such a coordinate is nearly zero, and a least-squares
+//! step along it nearly infinite: ten thousand rad/s, after which the replay has nothing to do with
+//! the log. So each coordinate has a normal prior. Its standard deviation is twice the largest
+//! value of the coordinate, about any axis of its joint, while the model replays the logs.
 
 use std::ops::Range;
 
@@ -16,11 +17,13 @@ use crate::machine::Machine;
 use crate::predict::Point;
 use crate::trajectory::{Path, Trajectory};
 
-/// Deviation of a start, relative to the largest value of its coordinate.
+/// Standard deviation of an initial state's coordinate, relative to its largest value.
 const OPEN: f64 = 2.0;
 
-/// Deviations of the `open` coordinates (`nv` positions, then `nv` velocities) of starts, m or rad or per second, by what a machine does
-/// from a point on.
+/// Returns the standard deviations of the `open` coordinates (`nv` positions, then `nv` velocities)
+/// of initial states, m or rad or per second.
+///
+/// They follow from what a machine does from a point on.
 ///
 /// # Errors
 /// When the engine fails.
@@ -40,18 +43,20 @@ pub(crate) fn reach(
     Ok(open.iter().map(|&c| OPEN * largest[c]).collect())
 }
 
-/// Least that a coordinate may lie from where it is first put, m or rad or per second.
+/// Least value of `largest` for a coordinate, m or rad or per second.
 const LEAST: f64 = 1e-6;
 
-/// Largest magnitude of each coordinate along some paths, of positions their distance from the first row's, of all axes of its joint that turn, or
-/// that shift.
+/// Returns the largest magnitude of each coordinate along some paths; that of a position is its
+/// distance from the first row's.
+///
+/// All rotational axes of a joint share one value, and so do all translational axes.
 fn largest(layout: &Layout, paths: &[Path]) -> Vec<f64> {
     let nv = layout.nv;
     let mut largest = vec![LEAST; 2 * nv];
     for path in paths {
         let rows = path.qpos.chunks_exact(layout.nq);
         let rows = rows.zip(path.qvel.chunks_exact(nv));
-        // A replay that diverged says nothing from there on.
+        // A replay that diverged carries no information from there on.
         let finite = rows.take_while(|(q, v)| q.iter().chain(*v).all(|x| x.is_finite()));
         for (q, v) in finite {
             for joint in &layout.joints {
@@ -69,8 +74,8 @@ fn largest(layout: &Layout, paths: &[Path]) -> Vec<f64> {
     largest
 }
 
-/// Degrees of freedom by which a joint shifts, and by which it turns, with how far each has taken it, at most along one axis, from one configuration
-/// to another, m or rad.
+/// Returns the translational and the rotational degrees of freedom of a joint, each with the
+/// largest move of one axis between two configurations, m or rad.
 fn shifts_and_turns(joint: &Joint, from: &[f64], to: &[f64]) -> Vec<(Range<usize>, f64)> {
     let (place, dof) = (joint.qpos, joint.qvel);
     let shift = |axes: usize| {

@@ -1,4 +1,4 @@
-//! The study file: what is written in it, its checks, and the study that it makes.
+//! The study file: its contents, its checks, and the study that it describes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use super::{Study, files};
 
-/// The file, as written.
+/// The contents of the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -32,7 +32,7 @@ struct Document {
     column: Vec<ColumnMapping>,
 }
 
-/// A parameter, as written.
+/// A parameter, as written in the file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyParameter {
@@ -48,11 +48,11 @@ struct StudyParameter {
     unit: String,
 }
 
-/// Makes a message an error of the file.
+/// Converts a message to an error of the file.
 type Fail<'a> = &'a dyn Fn(String) -> Error;
 
 impl Document {
-    /// The parameters, each checked and with a name of its own.
+    /// Returns the parameters, each checked and with a unique name.
     fn parameters(&self, fail: Fail<'_>) -> Result<Vec<Parameter>> {
         let parameters = (self.parameter.iter())
             .map(|p| parameter(p).map_err(fail))
@@ -66,7 +66,7 @@ impl Document {
         Ok(parameters)
     }
 
-    /// Whether every noise is that of a sensor, and above 0.
+    /// Checks that every noise is positive and of a known sensor.
     fn check_noise(&self, layout: &Layout, fail: Fail<'_>) -> Result<()> {
         for (sensor, &noise) in &self.noise {
             layout
@@ -81,7 +81,7 @@ impl Document {
         Ok(())
     }
 
-    /// Whether every mapping of a column fits the machine, and has a name of its own.
+    /// Checks that every column mapping fits the machine and has a unique name.
     fn check_columns(&self, plant: &Plant, fail: Fail<'_>) -> Result<()> {
         for (i, mapping) in self.column.iter().enumerate() {
             mapping.check(&plant.layout).map_err(|e| of_file(e, fail))?;
@@ -94,7 +94,7 @@ impl Document {
     }
 }
 
-/// An error of a setting as one of the file.
+/// Converts an error of a setting to one of the file.
 fn of_file(error: Error, fail: Fail<'_>) -> Error {
     match error {
         Error::Config { message, .. } => fail(message),
@@ -111,7 +111,7 @@ impl Study {
         Self::read_with(path, None)
     }
 
-    /// The same with another `model` in place of the study's own, where there is one.
+    /// Reads a study with another `model` in place of its own, if one is given.
     ///
     /// # Errors
     /// As [`Study::read`].
@@ -192,7 +192,7 @@ impl Study {
     }
 }
 
-/// The message of a reader of TOML on one line.
+/// Returns the message of a TOML parser on one line.
 fn one_line(error: &toml::de::Error) -> String {
     error
         .message()
@@ -201,7 +201,8 @@ fn one_line(error: &toml::de::Error) -> String {
         .join(" ")
 }
 
-/// Whether the machine has the geom, body, joint or actuator that a target names; other elements are the engine's to know.
+/// Checks that the machine has the geom, body, joint or actuator that a target names; the engine
+/// checks other elements.
 fn named(plant: &Plant, target: &Target) -> Result<()> {
     let layout = &plant.layout;
     let (kind, names): (_, Vec<&str>) = match &*target.element {
@@ -220,7 +221,9 @@ fn named(plant: &Plant, target: &Target) -> Result<()> {
     Err(Error::unknown(kind, &target.name, names))
 }
 
-/// Names the mass of a body that is the mass of one geom by that geom, as effects of mass do: a model has one name for each thing that is set.
+/// Replaces the mass of a body by the mass of its geom, if a single geom has it.
+///
+/// Effects on masses use geoms, and a model has one name for each value that is set.
 fn by_geom(plant: &Plant, target: &mut Target) {
     if (&*target.element, &*target.attribute) != ("body", "mass") {
         return;
@@ -232,7 +235,7 @@ fn by_geom(plant: &Plant, target: &mut Target) {
     }
 }
 
-/// The parameter that an entry describes.
+/// Returns the parameter that an entry describes.
 fn parameter(written: &StudyParameter) -> Result<Parameter, String> {
     let mut targets = written.targets.clone();
     targets.extend(written.target.clone());

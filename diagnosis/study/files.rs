@@ -1,4 +1,4 @@
-//! The logs that a study names: patterns of files, and how each file is read.
+//! The logs that a study names: file patterns, and how each file is read.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ pub(super) struct Logs<'a> {
     opener: Opener,
 }
 
-/// A log: its name, the episode, and what was passed over or mended.
+/// A log: its name, the episode, and what was skipped or repaired.
 type Read = (String, Episode, LogNotes);
 
 impl<'a> Logs<'a> {
@@ -34,10 +34,10 @@ impl<'a> Logs<'a> {
         }
     }
 
-    /// Reads the logs that some patterns name, each once, sorted by name within a pattern.
+    /// Reads the logs that some patterns match, each once, sorted by name within a pattern.
     ///
     /// # Errors
-    /// When a pattern names nothing, or a log cannot be used.
+    /// When a pattern matches nothing, or a log cannot be used.
     pub(super) fn read(&mut self, patterns: &[String], key: &str) -> Result<Vec<Read>> {
         let mut files: Vec<PathBuf> = Vec::new();
         for pattern in patterns {
@@ -67,13 +67,13 @@ impl<'a> Logs<'a> {
         Ok(read)
     }
 
-    /// The logs of a file: one, or all episodes of a dataset.
+    /// Reads the logs of a file: one, or all episodes of a dataset.
     fn file(&mut self, file: &Path) -> Result<Vec<Read>> {
         let name = |path: &Path| {
             let short = path.strip_prefix(self.folder).unwrap_or(path);
             short.display().to_string()
         };
-        // An episode of a dataset (`dataset#3`) is no file.
+        // An episode of a dataset (`dataset#3`) is not a file of its own.
         let (at, _) = asid_logs::open::split(file);
         if self.settings.kind_of(&at).is_table() {
             let (episode, notes) =
@@ -100,7 +100,7 @@ impl<'a> Logs<'a> {
     }
 }
 
-/// Files of a folder whose name matches a pattern with `*` in its last part, sorted.
+/// Returns the files of a folder whose names match a pattern with `*` in its last part, sorted.
 fn matching(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     let path = folder.join(pattern);
     let (Some(parent), Some(last)) = (path.parent(), path.file_name()) else {
@@ -125,7 +125,7 @@ fn matching(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Whether a name matches a pattern whose `*` stand for any characters.
+/// Whether a name matches a pattern in which each `*` stands for any characters.
 fn matches(pattern: &str, name: &str) -> bool {
     let mut parts = pattern.split('*');
     let first = parts.next().unwrap_or_default();
