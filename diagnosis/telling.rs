@@ -1,4 +1,4 @@
-//! What a search found, told as a result: gaps, probabilities, places, pictures.
+//! Turns what a search found into a result: gaps, probabilities, places, pictures.
 
 use asid_core::{Episode, Result};
 use asid_effects::EffectSpec;
@@ -38,21 +38,21 @@ use unexplained::{least_explained, least_made_up};
 
 /// A finished diagnosis.
 pub struct Diagnosis {
-    /// `result.json`.
+    /// Contents of `result.json`.
     pub result: DiagnosisResult,
-    /// What the report shows besides.
+    /// What the report shows in addition.
     pub trace: DiagnosisTrace,
-    /// What the decision rests on.
+    /// The evidence on which the decision rests.
     pub evidence: Evidence,
     /// Effects of the verdict, with their values; empty for none.
     pub effects: Vec<EffectSpec>,
-    /// Values of the study's parameters that go with them.
+    /// Values of the study's parameters that belong to these effects.
     pub values: Vec<f64>,
-    /// Commands of the next experiment; `None` where there is none to play.
+    /// Commands of the next experiment; `None` if there is none to play.
     pub next_commands: Option<Episode>,
 }
 
-/// All that a result is told from.
+/// Everything from which a result is made.
 pub(crate) struct Telling<'a> {
     pub(crate) study: &'a Study,
     pub(crate) bench: &'a Bench,
@@ -63,12 +63,12 @@ pub(crate) struct Telling<'a> {
     pub(crate) judgement: &'a Judgement,
     pub(crate) nominal: &'a [f64],
     pub(crate) settings: Settings,
-    /// Whether only what the answer needs is to be computed.
+    /// Whether the work was stopped, so that only what the answer needs is computed.
     pub(crate) stopped: bool,
 }
 
-/// Predictions of the held-out logs by one model: readings and plain residuals in units of
-/// the noise.
+/// Predictions of the held-out logs by one model: initial states, readings, and residuals in units
+/// of the noise, without whitening.
 #[derive(Clone)]
 struct HeldOut {
     starts: Vec<State>,
@@ -92,8 +92,10 @@ impl Telling<'_> {
         found.map_or_else(|| self.findings.none.clone(), |f| f.explanation.clone())
     }
 
-    /// Replays the held-out logs by the model as given, as identified, and as refined by an explanation with its trials; the same model is
-    /// replayed once.
+    /// Replays the held-out logs by three models: as given, as identified, and as refined by an
+    /// explanation with its trials.
+    ///
+    /// Equal models are replayed once.
     fn all_held(&self, (trials, refined): (&[Trial<'_>], &Explanation)) -> Result<[HeldOut; 3]> {
         let bench = self.bench;
         let none = &self.findings.none;
@@ -115,7 +117,7 @@ impl Telling<'_> {
         Ok([nominal, identified, refined])
     }
 
-    /// Replays the held-out logs from some starts without whitening.
+    /// Replays the held-out logs from some initial states, without whitening.
     fn held(&self, trials: &[Trial<'_>], theta: &[f64], starts: Vec<State>) -> Result<HeldOut> {
         let bench = self.bench;
         let mut predictor = bench.predictor(trials, &bench.test)?;
@@ -133,7 +135,7 @@ impl Telling<'_> {
         })
     }
 
-    /// The whole result.
+    /// Makes the whole result.
     pub(crate) fn tell(&self) -> Result<Diagnosis> {
         let j = self.judgement;
         let best = self.found(j.best);
@@ -217,7 +219,7 @@ impl Telling<'_> {
         })
     }
 
-    /// Where the gap of the identified model lies, in the training logs.
+    /// Returns where the gap of the identified model lies, in the training logs.
     fn places(&self, none: &Explanation) -> Result<Vec<crate::result::Where>> {
         let record = &self.bench.train;
         let mut predictor = self.bench.predictor(&[], record)?;
@@ -252,7 +254,7 @@ impl Telling<'_> {
         all.extend(checks::identifiability(&bench.parameters, none, best));
         let repeats = self.findings.repeats;
         all.extend(repeats.map(checks::repeatability));
-        // What nobody can repeat changes with the time step as well.
+        // Replays that do not repeat change with the time step as well.
         let scatters = repeats.is_some_and(|r| r.scatters);
         if let Ok(halved) = bench.machine.halved()
             && !self.stopped
@@ -267,7 +269,7 @@ impl Telling<'_> {
         Ok(all)
     }
 
-    /// What would tell the verdict from its nearest rival.
+    /// Proposes an experiment that distinguishes the verdict from its nearest rival.
     fn next(&self, best: Option<&Found>) -> Result<Proposed> {
         let j = self.judgement;
         let rival = j.ambiguous.first().copied().or_else(|| {

@@ -1,10 +1,9 @@
-//! Logs cut into short windows, each from a start of its own.
+//! Logs cut into short windows, each with an initial state of its own.
 //!
-//! Where sensors read where the machine is, any row can be a start, not only the first. Over a
-//! window a model cannot drift far off, whatever it lacks and however long the log, so that
-//! its gradient can be believed everywhere; and what the machine does late in a log counts
-//! as much as what it does first. The windows' starts are nuisance parameters, as any that
-//! are not known.
+//! Where sensors read the positions of the machine, any row can be an initial state, not only the
+//! first. Over a window a model cannot drift far, whatever it lacks and however long the log is, so
+//! that its gradient is reliable everywhere. What the machine does late in a log counts as much as
+//! what it does first. The windows' initial states are nuisance parameters, like any unknown ones.
 
 use asid_core::Result;
 use asid_core::layout::JointKind;
@@ -19,12 +18,13 @@ use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::starts::given_start;
 
-/// Share of the longest log that a window is.
+/// Length of a window as a share of the longest log.
 const SHARE: f64 = 0.1;
-/// Fewest rows of a window: a start and a speed are not told by less.
+/// Fewest rows of a window: fewer do not determine an initial state and a speed.
 const ROWS: usize = 10;
 
-/// Rows of a window; `None` where the logs give starts, or do not show where the machine is.
+/// Returns the number of rows of a window; `None` if the logs give initial states, or do not show
+/// where the machine is.
 #[must_use]
 pub fn rows(plant: &Plant, logs: &Logs, open: &[usize]) -> Option<usize> {
     let layout = &plant.layout;
@@ -49,11 +49,11 @@ pub fn rows(plant: &Plant, logs: &Logs, open: &[usize]) -> Option<usize> {
     });
     let longest = logs.episodes.iter().map(|e| e.plan.rows()).max()?;
     let window = ((SHARE * longest as f64).ceil() as usize).max(ROWS);
-    // Logs of hardly more than a window are windows as they are.
+    // Logs hardly longer than a window are used whole.
     known.then_some(if longest < 3 * ROWS { longest } else { window })
 }
 
-/// The windows of some logs, with their starts as the readings say.
+/// Cuts logs into windows, whose initial states follow from the readings.
 #[must_use]
 pub fn cut(plant: &Plant, record: &Record, rows: usize) -> Record {
     let logs = record.logs.windows(&plant.layout, rows);
@@ -62,8 +62,8 @@ pub fn cut(plant: &Plant, record: &Record, rows: usize) -> Record {
     Record::new(logs, starts)
 }
 
-/// Starts of some windows in a model with some effects, fitted at values of the study's
-/// parameters.
+/// Fits the initial states of some windows in a model with some effects, at given values of the
+/// study's parameters.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -106,7 +106,7 @@ mod tests {
       <body name="b"><joint name="b" type="hinge" axis="0 1 0"/><geom size="0.1" mass="1"/></body></body>
       </worldbody><sensor><jointpos name="qa" joint="a"/><jointpos name="qb" joint="b"/></sensor></mujoco>"#;
 
-    /// A log of `rows` rows, 10 ms apart: angle `a` turns at 2 rad/s, `b` stands at 1 rad.
+    /// Makes a log of `rows` rows, 10 ms apart: angle `a` turns at 2 rad/s, `b` stands at 1 rad.
     fn logs(plant: &Plant, sensors: &[&str], rows: usize) -> Logs {
         let names: Vec<String> = sensors.iter().map(|s| (*s).to_owned()).collect();
         let column = |name: &String| ChannelColumns {

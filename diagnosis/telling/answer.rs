@@ -10,7 +10,7 @@ use crate::ceiling::Left;
 use crate::findings::trials;
 use crate::result::{EffectResult, Gap, Group, HypothesisResult, Kind, Tolerance, Verdict};
 
-/// Effects of a verdict that are one law at several sites.
+/// Returns the effects of a verdict that are one law at several sites.
 pub(super) fn groups(labels: &[String]) -> Vec<Group> {
     let mut all: Vec<Group> = Vec::new();
     for (effect, site) in labels.iter().filter_map(|l| l.split_once('@')) {
@@ -26,7 +26,7 @@ pub(super) fn groups(labels: &[String]) -> Vec<Group> {
     all
 }
 
-/// What an explanation has of an ordinary machine's tolerances.
+/// Returns the tolerances that an explanation contains.
 pub(super) fn tolerances(of: &Explanation) -> Vec<Tolerance> {
     let all = of.effects.iter().zip(&of.is_tolerance);
     let own = all.filter(|(_, is_tolerance)| **is_tolerance);
@@ -38,7 +38,7 @@ pub(super) fn tolerances(of: &Explanation) -> Vec<Tolerance> {
     .collect()
 }
 
-/// Counts an effect of a set that was screened only: it has no fitted values.
+/// Adds the probability of an effect of a set that was only screened; it has no fitted values.
 fn screened(all: &mut Vec<EffectResult>, label: &str, probability: f64) {
     match all.iter_mut().find(|e| e.label() == label) {
         Some(known) => known.probability += probability,
@@ -55,7 +55,7 @@ fn screened(all: &mut Vec<EffectResult>, label: &str, probability: f64) {
 }
 
 impl Telling<'_> {
-    /// The verdict of a kind; `labels` are the effects of the best explanation.
+    /// Makes the verdict of a kind; `labels` are the effects of the best explanation.
     pub(super) fn verdict(
         &self,
         kind: Kind,
@@ -106,8 +106,10 @@ impl Telling<'_> {
         all
     }
 
-    /// Effects of the hypotheses, each as fitted in the most probable set that has it. `moved` is how far the engine's own error moves each
-    /// fitted value of the best.
+    /// Returns the effects of the hypotheses, each as fitted in the most probable set that contains
+    /// it.
+    ///
+    /// `moved` is how far the engine's own error moves each fitted value of the best.
     pub(super) fn effects(&self, identified: f64, moved: &[f64]) -> Result<Vec<EffectResult>> {
         let j = self.judgement;
         let mut all: Vec<EffectResult> = Vec::new();

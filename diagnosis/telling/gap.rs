@@ -1,18 +1,21 @@
-//! The gap on the held-out logs, in units of the noise, and how much of it is closed, with its interval.
+//! The gap on the held-out logs, in units of the noise, and how much of it is closed, with its
+//! interval.
 
 use asid_core::Streams;
 
 use super::{HeldOut, Telling};
 use crate::result::{Gap, SignalGap};
 
-/// Samples of the bootstrap.
+/// Number of bootstrap samples.
 const RESAMPLES: usize = 2000;
-/// Identified gap up to which there is nothing to close.
+/// Gap of the identified model up to which there is nothing to close.
 pub(super) const NO_GAP: f64 = 1.05;
 
 impl Telling<'_> {
-    /// Sum of squares of some of the residuals that have a reading, and their number; capped where a
-    /// simulation diverged.
+    /// Returns the sum of squared residuals that have a reading, of all or of one sensor or
+    /// episode, and their number.
+    ///
+    /// Where a simulation diverged, each square is capped.
     pub(super) fn rms(
         &self,
         residuals: &[f64],
@@ -43,7 +46,8 @@ impl Telling<'_> {
         (square, count)
     }
 
-    /// The gap of the three models: as given, with the study's parameters fitted, with the verdict's effects.
+    /// Returns the gap of three models: as given, with the study's parameters fitted, and with the
+    /// verdict's effects.
     pub(super) fn gap(&self, nominal: &HeldOut, identified: &HeldOut, refined: &HeldOut) -> Gap {
         let logs = &self.bench.test.logs;
         let root = |(square, count): (f64, f64)| (square / f64::max(count, 1.0)).sqrt();

@@ -1,4 +1,5 @@
-//! How the gap is shared out: named, learnable, and what neither foretells; and what is left beside what is named.
+//! How the gap is divided: named, learnable, and not predictable; and what remains beside what is
+//! named.
 
 use asid_core::Result;
 
@@ -10,10 +11,10 @@ use crate::findings::LEAST_GAP;
 use crate::prepare::plain_residuals;
 use crate::result::{Gap, Kind, Remainder, Shares};
 
-/// Most rows of a sensor's entry that are learned from.
+/// Maximum number of rows of a sensor's entry from which a model learns.
 const ROWS: usize = 6000;
 
-/// How the excess is shared out where `left` is what a verdict of a kind leaves; `None` where there is none.
+/// Divides the excess, where `left` is what a verdict of a kind leaves; `None` if there is none.
 pub(super) fn shares(gap: &Gap, kind: Kind, left: &[Left]) -> Option<Shares> {
     let closed = gap.closed?.clamp(0.0, 1.0);
     let learnable = (1.0 - closed) * learnable(left);
@@ -24,7 +25,7 @@ pub(super) fn shares(gap: &Gap, kind: Kind, left: &[Left]) -> Option<Shares> {
             learnable,
             unrepeatable,
         },
-        // What comes nearest without being named is learned all the same.
+        // What comes closest without being named is learnable nevertheless.
         Kind::None | Kind::Unknown => Shares {
             named: 0.0,
             learnable: closed + learnable,
@@ -33,7 +34,7 @@ pub(super) fn shares(gap: &Gap, kind: Kind, left: &[Left]) -> Option<Shares> {
     })
 }
 
-/// What is left beside effects that are named.
+/// Returns what remains beside effects that are named.
 pub(super) fn remainder(gap: &Gap, kind: Kind, left: &[Left]) -> Option<Remainder> {
     let is_left = kind == Kind::Effects && gap.refined > LEAST_GAP && gap.identified > NO_GAP;
     let most = most(left).filter(|_| is_left)?;
@@ -46,7 +47,8 @@ pub(super) fn remainder(gap: &Gap, kind: Kind, left: &[Left]) -> Option<Remainde
 }
 
 impl Telling<'_> {
-    /// What an explanation leaves: of the missing force where it was estimated, else of whole replays of the training logs.
+    /// Returns what an explanation leaves: of the missing force where that was estimated, else of
+    /// whole replays of the training logs.
     pub(super) fn left(&self, trials: &[Trial<'_>], of: &Explanation) -> Result<Vec<Left>> {
         if !self.findings.left.is_empty() {
             return Ok(self.findings.left.clone());
@@ -72,7 +74,8 @@ impl Telling<'_> {
         Ok((0..n).map(of_entry).collect())
     }
 
-    /// What is left of one entry along an episode, with what the machine was told and what it read.
+    /// Returns what is left of one entry along an episode, with time, its rate of change and the
+    /// commands as variables.
     fn course(&self, episode: usize, entry: usize, stride: usize, residuals: &[f64]) -> Course {
         let logs = &self.bench.train.logs;
         let log = &logs.episodes[episode];

@@ -1,4 +1,4 @@
-//! What the report shows besides the numbers: curves, the ladder of single effects, the map.
+//! What the report shows in addition to the numbers: curves, the ladder of single effects, the map.
 
 use std::collections::BTreeMap;
 
@@ -13,15 +13,15 @@ use crate::trace::{
     DiagnosisTrace, EffectWords, Map, NamedText, ParameterWords, Rung, SignalTrace,
 };
 
-/// Points of one curve in the trace.
+/// Maximum number of points of one curve in the trace.
 const CURVE: usize = 600;
-/// Held-out episodes in the trace.
+/// Number of held-out episodes in the trace.
 const SHOWN: usize = 3;
-/// Points of the map.
+/// Maximum number of points of the map.
 const MAP: usize = 4000;
 
 impl Telling<'_> {
-    /// Of the first held-out episodes, and of all single effects.
+    /// Makes the trace of the first held-out episodes and of all single effects.
     pub(super) fn trace(
         &self,
         nominal: &HeldOut,
@@ -100,7 +100,7 @@ impl Telling<'_> {
         })
     }
 
-    /// Where a position sensor was, and how large its residual there.
+    /// Returns where a position sensor was, with the size of its residual there.
     fn map(&self, identified: &HeldOut) -> Option<Map> {
         let logs = &self.bench.test.logs;
         let (n, width) = (logs.entries.len(), logs.width());
@@ -133,7 +133,7 @@ impl Telling<'_> {
     }
 }
 
-/// What the catalogue says of some effects.
+/// Returns what the catalogue says about some effects.
 fn catalogue(effects: &[EffectResult]) -> BTreeMap<String, EffectWords> {
     let known = effects.iter().filter_map(|e| {
         let entry = find::<EffectEntry>(&e.effect).ok()?;

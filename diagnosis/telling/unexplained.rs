@@ -1,4 +1,5 @@
-//! Force that the model still lacks with the best explanation: where most of it is left, in words.
+//! Force that the model still lacks with the best explanation: the place where most of it is left,
+//! in words.
 
 use asid_core::Result;
 
@@ -8,10 +9,10 @@ use crate::forces::{self, Short};
 use crate::result::MissingForce;
 use crate::windows;
 
-/// Share of the force that the model lacks at a joint from which on it counts as unexplained.
+/// Share of the missing force at a joint from which on it counts as unexplained.
 const UNEXPLAINED: f64 = 0.7;
 
-/// The joint at which most of the force that the model lacks is left, in words.
+/// Describes the joint at which the largest share of the missing force over short windows is left.
 pub(super) fn least_explained(before: &Short, after: &Short) -> Option<String> {
     let pairs = before.joints.iter().zip(&after.joints);
     let shares = pairs.map(|(a, b)| (b.force / a.force, a, b));
@@ -26,7 +27,8 @@ pub(super) fn least_explained(before: &Short, after: &Short) -> Option<String> {
     })
 }
 
-/// The same where the force was estimated moment by moment.
+/// Describes the degree of freedom at which the largest share is left, of a force that was
+/// estimated moment by moment.
 pub(super) fn least_made_up(missing: &[MissingForce]) -> Option<String> {
     let share = |m: &MissingForce| m.refined / m.identified;
     let worst = missing
@@ -42,8 +44,8 @@ pub(super) fn least_made_up(missing: &[MissingForce]) -> Option<String> {
 }
 
 impl Telling<'_> {
-    /// What short replays tell, where the logs allow them: without any effect, with those of the
-    /// best explanation, and how long they are, s.
+    /// Returns the results of short replays, if the logs allow them: without effects, with those of
+    /// the best explanation, and their duration, s.
     pub(super) fn short(
         &self,
         none: &Explanation,
@@ -51,7 +53,8 @@ impl Telling<'_> {
     ) -> Result<Option<(Short, Short, f64)>> {
         let bench = self.bench;
         let plant = &bench.machine.plant;
-        // They take seconds of machines of many joints: a search that had no time has none for them.
+        // Short replays take seconds for machines of many joints: a search that had no time has
+        // none for them.
         if self.stopped || !self.findings.missing.is_empty() {
             return Ok(None);
         }

@@ -1,4 +1,5 @@
-//! Units of an effect's values at its site: a catalogue's `N m s/rad or N s/m` is the first at a hinge and the second at a slide.
+//! Units of an effect's values at its site: of a catalogue's `N m s/rad or N s/m` the first holds
+//! at a hinge, the second at a slide.
 
 use std::collections::BTreeMap;
 
@@ -8,16 +9,16 @@ use asid_effects::{EffectEntry, EffectSpec};
 
 use crate::bench::Bench;
 
-/// What separates the two units of a value that acts at hinges and at slides.
+/// Separator of the two units of a value that acts at hinges and at slides.
 const EITHER: &str = " or ";
-/// What stands for the unit of the sensor at the site.
+/// Placeholder for the unit of the sensor at the site.
 const OF_READING: [&str; 2] = ["unit of the reading", "units of the reading"];
 
-/// What a site says of units.
+/// What a site determines about units.
 struct Site<'s> {
-    /// Kind of the joint that it is, or that its drive moves.
+    /// Kind of the joint that the site is, or that its drive moves.
     joint: Option<JointKind>,
-    /// Unit of the sensor that it is.
+    /// Unit of the sensor that the site is.
     reading: Option<&'s str>,
 }
 
@@ -37,7 +38,7 @@ impl<'s> Site<'s> {
         }
     }
 
-    /// The unit here of a value whose unit a catalogue declares.
+    /// Returns the unit at this site of a value whose unit a catalogue declares.
     fn unit(&self, declared: &str) -> String {
         if let Some(unit) = self.reading {
             let [one, many] = OF_READING;
@@ -51,7 +52,8 @@ impl<'s> Site<'s> {
     }
 }
 
-/// Of two units, `A or B`, the one about an axis or the one along it; what is said behind a comma stays.
+/// Chooses from two units, `A or B`, the one about an axis or the one along it; text after a comma
+/// stays.
 fn one_of(declared: &str, about_axis: bool) -> String {
     let (units, said) = declared.split_at(declared.find(',').unwrap_or(declared.len()));
     let Some((a, b)) = units.split_once(EITHER) else {
@@ -65,7 +67,7 @@ fn one_of(declared: &str, about_axis: bool) -> String {
     }
 }
 
-/// Units of the values of an effect at its site, by name.
+/// Returns the units of an effect's values at its site, by name.
 pub(super) fn units(bench: &Bench, effect: &EffectSpec) -> BTreeMap<String, String> {
     let Ok(entry) = find::<EffectEntry>(&effect.name) else {
         return BTreeMap::new();

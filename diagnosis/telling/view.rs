@@ -1,4 +1,4 @@
-//! The machine in 3-D: logs beside replays of their commands, and the force that is missing.
+//! The machine in 3-D: logs beside replays of their commands, and the missing force.
 
 use asid_core::{Model, Result};
 use asid_results::view::{Origin, View};
@@ -11,10 +11,10 @@ use crate::data::Logs;
 use crate::predict::{Point, State};
 use crate::trajectory::positions;
 
-/// Held-out episodes that are shown.
+/// Number of held-out episodes that are shown.
 const SHOWN: usize = 3;
 
-/// A model whose replays are seen.
+/// A model whose replays are shown.
 struct Seen<'a> {
     origin: Origin,
     label: &'a str,
@@ -23,7 +23,8 @@ struct Seen<'a> {
 }
 
 impl Telling<'_> {
-    /// The first held-out episodes, and the training episode whose missing force is shown.
+    /// Makes the view of the first held-out episodes and of the training episode whose missing
+    /// force is shown.
     pub(super) fn view(
         &self,
         [nominal, identified, refined]: [&HeldOut; 3],
@@ -95,7 +96,8 @@ impl Telling<'_> {
         Ok(view)
     }
 
-    /// An episode as logged, where any sensor reads a position, and as these models replay it.
+    /// Returns the motions of an episode: as logged, where a sensor reads a position, and as these
+    /// models replay it.
     fn motions(
         &self,
         logs: &Logs,

@@ -8,7 +8,7 @@ use asid_readings::replay::ReplayPlan;
 use super::Trajectory;
 
 impl Trajectory {
-    /// Whether a geom's body touches anything in these episodes.
+    /// Whether the body of a geom touches anything in these episodes.
     #[must_use]
     pub fn touches(&self, plant: &Plant, geom: &str) -> bool {
         let Ok(geom) = plant.geom(geom) else {
@@ -19,7 +19,7 @@ impl Trajectory {
         pairs.into_iter().any(|(p, &t)| t && p.contains(&body))
     }
 
-    /// Whether two bodies touch that do not in other episodes of the same machine.
+    /// Whether two bodies touch here that do not touch in other episodes of the same machine.
     #[must_use]
     pub fn touches_more_than(&self, other: &Self) -> bool {
         let mut pairs = self.touched.iter().zip(&other.touched);
@@ -27,7 +27,7 @@ impl Trajectory {
     }
 }
 
-/// Pairs of bodies that can touch.
+/// Returns the pairs of bodies that can touch.
 pub(super) fn pairs_of(plant: &Plant) -> Vec<[usize; 2]> {
     let mut pairs: Vec<[usize; 2]> = plant
         .contacts
@@ -42,13 +42,13 @@ pub(super) fn pairs_of(plant: &Plant) -> Vec<[usize; 2]> {
     pairs
 }
 
-/// Channel of the normal force between two bodies.
+/// Returns the channel of the normal force between two bodies.
 pub(super) fn contact_channel(layout: &Layout, [a, b]: [usize; 2]) -> String {
     format!("contact.{}/{}", layout.bodies[a], layout.bodies[b])
 }
 
-/// Replays an episode and looks at the contacts after every physics step: a tap is shorter than the
-/// time between two rows.
+/// Replays an episode and marks the pairs in contact after each physics step: a tap is shorter than
+/// the time between two rows.
 pub(super) fn look_for_touches(
     simulator: &mut dyn Simulator,
     plan: &ReplayPlan,

@@ -1,4 +1,5 @@
-//! Envelope of the motion: largest commands, speeds and forces, spreads of the readings, and where bodies meet.
+//! Envelope of the motion: largest commands, speeds and forces, spreads of the readings, and where
+//! bodies meet.
 
 use asid_mjcf::Plant;
 
@@ -6,7 +7,7 @@ use super::Trajectory;
 use crate::data::Logs;
 
 impl Trajectory {
-    /// Largest command of an actuator; about its mean where it is a position.
+    /// Returns the largest command of an actuator, relative to its mean if it is a position.
     #[must_use]
     pub fn command(&self, plant: &Plant, actuator: usize) -> f64 {
         let nu = plant.layout.nu();
@@ -20,7 +21,7 @@ impl Trajectory {
         all().map(|u| (u - mean).abs()).fold(0.0, f64::max)
     }
 
-    /// Largest speed of a hinge or slide.
+    /// Returns the largest speed of a hinge or slide.
     #[must_use]
     pub fn speed(&self, plant: &Plant, joint: usize) -> f64 {
         let (nv, at) = (plant.layout.nv, plant.layout.joints[joint].qvel);
@@ -31,7 +32,7 @@ impl Trajectory {
             .fold(0.0, |a, v| a.max(v.abs()))
     }
 
-    /// How far a hinge or slide travels between its ends, rad or m.
+    /// Returns the travel of a hinge or slide from end to end, rad or m.
     #[must_use]
     pub fn travel(&self, plant: &Plant, joint: usize) -> f64 {
         let (nq, at) = (plant.layout.nq, plant.layout.joints[joint].qpos);
@@ -45,7 +46,7 @@ impl Trajectory {
         (ends[1] - ends[0]).max(0.0)
     }
 
-    /// Largest force of the drives on a hinge or slide, N or N m.
+    /// Returns the largest force of the drives on a hinge or slide, N or N m.
     #[must_use]
     pub fn force(&self, plant: &Plant, joint: usize) -> f64 {
         let layout = &plant.layout;
@@ -67,14 +68,15 @@ impl Trajectory {
         largest
     }
 
-    /// Spread of a sensor's readings: their deviation.
+    /// Returns the standard deviation of a sensor's readings.
     #[must_use]
     pub fn reading(&self, sensor: &str) -> f64 {
         let found = self.readings.iter().find(|(name, _)| name == sensor);
         found.map_or(1.0, |(_, spread)| *spread)
     }
 
-    /// Quantiles of where the bodies that meet a geom are along a world axis, m.
+    /// Returns quantiles of the positions along a world axis, m, of the bodies that can touch a
+    /// geom.
     #[must_use]
     pub fn places(&self, plant: &Plant, geom: &str, axis: usize, quantiles: &[f64]) -> Vec<f64> {
         let Ok(site) = plant.geom(geom) else {
@@ -88,7 +90,7 @@ impl Trajectory {
             let at = plant.layout.joints[joint].qpos + axis;
             for e in &self.episodes {
                 let column = e.qpos.iter().skip(at).step_by(plant.layout.nq);
-                // A body that rests for long would hide where it passed.
+                // Rows at rest are skipped: a long rest would outweigh where the body passed.
                 let mut last = f64::NAN;
                 for &x in column.filter(|x| x.is_finite()) {
                     if (x - last).abs() < 1e-3 {
@@ -108,7 +110,7 @@ impl Trajectory {
     }
 }
 
-/// Bodies that can touch a geom, and its own where it moves.
+/// Returns the bodies that can touch a geom, and its own if it moves.
 fn movers(plant: &Plant, geom: usize) -> Vec<usize> {
     let mut bodies: Vec<usize> = plant
         .contacts
@@ -123,7 +125,7 @@ fn movers(plant: &Plant, geom: usize) -> Vec<usize> {
     bodies
 }
 
-/// Spread of the readings of each sensor, by its name.
+/// Returns the standard deviation of the readings of each sensor, with its name.
 pub(super) fn spreads(logs: &Logs) -> Vec<(String, f64)> {
     let width = logs.width();
     let mut at = 0;
