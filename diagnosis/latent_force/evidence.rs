@@ -2,8 +2,8 @@
 //!
 //! `X'X` and `X'y` are those of whitened innovations. Coefficients are in prior standard
 //! deviations, with the prior `N(0, 1)`. Let `A = X'X + I`, and `c` be the best coefficients within
-//! their bounds. The log marginal likelihood relative to the model without the columns is then `b'c
-//! - c'Ac/2 - ln det A / 2` (MacKay 1992).
+//! their bounds. The log marginal likelihood relative to the model without the columns is then
+//! `b'c - c'Ac/2 - ln det A / 2` (MacKay 1992).
 
 use nalgebra::{DMatrix, DVector};
 
