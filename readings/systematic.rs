@@ -4,12 +4,12 @@
 //! millimetre or two. Neither averages out over an episode's readings. A likelihood with noise
 //! alone takes both for motion of the object, with false certainty. Here both have a normal prior
 //! and are integrated out. Let `V` be the derivatives of the whitened readings with respect to
-//! these errors, in their prior standard deviations. Then the readings have the covariance `I + V
-//! V^T` (Rasmussen and Williams 2006, section 2.7: basis functions with a prior on their weights).
-//! A residual is whitened by the Cholesky factor of this covariance. Entry by entry that is a
-//! Kalman filter of constant states, and the result is its normalised innovations. So the whitened
-//! residual of the first part of an episode is the first part of the whitened residual. None of
-//! this needs a simulation.
+//! these errors, in their prior standard deviations. Then the readings have the covariance
+//! `I + V V^T` (Rasmussen and Williams 2006, section 2.7: basis functions with a prior on their
+//! weights). A residual is whitened by the Cholesky factor of this covariance. Entry by entry that
+//! is a Kalman filter of constant states, and the result is its normalised innovations. So the
+//! whitened residual of the first part of an episode is the first part of the whitened residual.
+//! None of this needs a simulation.
 
 use asid_core::tracker::TrackerPrior;
 use nalgebra::{DMatrix, DVector};

@@ -1,10 +1,10 @@
 //! The smallest size of each effect that the logs could have shown (detection limit).
 //!
 //! Let `g` be the information of a column: its power in whitened innovations, the present model
-//! projected out. At a coefficient `c`, in prior standard deviations, it adds the evidence `c^2 g /
-//! 2 - ln(1 + g) / 2`. The limit is the smallest `c` that reaches the evidence that an effect must
-//! earn. It considers the evidence alone: where replays must confirm the effect, the limit can be
-//! larger.
+//! projected out. At a coefficient `c`, in prior standard deviations, it adds the evidence
+//! `c^2 g / 2 - ln(1 + g) / 2`. The limit is the smallest `c` that reaches the evidence that an
+//! effect must earn. It considers the evidence alone: where replays must confirm the effect, the
+//! limit can be larger.
 
 use asid_effects::Start;
 

@@ -2,8 +2,8 @@
 //! effect missing.
 //!
 //! The screening is a linear problem: whitened innovations are `X c` plus normal noise, and it uses
-//! only `X'y`. So drawing logs under the same commands needs no simulation: `X'y = G c + z` with `z
-//! ~ N(0, G)` and `G = X'X`, the present model projected out. Each draw is screened as the logs
+//! only `X'y`. So drawing logs under the same commands needs no simulation: `X'y = G c + z` with
+//! `z ~ N(0, G)` and `G = X'X`, the present model projected out. Each draw is screened as the logs
 //! were.
 
 use asid_core::Streams;

@@ -2,8 +2,8 @@
 //!
 //! Readings on a grid that is wider than the sensor's noise need no search: the log itself shows
 //! the steps and their width. Rounding also has no derivative that a regression could use. So the
-//! smoother gives such readings the noise of their steps: a uniform error has the variance `step² /
-//! 12`. The rounding is named next to whatever else is found.
+//! smoother gives such readings the noise of their steps: a uniform error has the variance
+//! `step² / 12`. The rounding is named next to whatever else is found.
 
 use nalgebra::DMatrix;
 

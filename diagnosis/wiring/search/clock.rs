@@ -58,8 +58,8 @@ impl Search<'_> {
     /// The clock becomes improbable if a delay of all commands shrinks misses as much: the drives
     /// themselves are then late. With one drive, only an initial state in motion separates the two.
     /// With several, all drives are seldom late alike. It also becomes improbable if friction
-    /// shrinks misses as much: a position servo of gain `kp` lags behind its command by `damping /
-    /// kp`.
+    /// shrinks misses as much: a position servo of gain `kp` lags behind its command by
+    /// `damping / kp`.
     pub(super) fn clock_or_drive(
         &mut self,
         view: &View,
