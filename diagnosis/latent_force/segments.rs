@@ -22,15 +22,15 @@ use super::walk::Walk;
 /// per cent of a force move a body by about a sensor's resolution. The second covers a few impacts,
 /// the last a whole stretch of contact.
 pub const DURATIONS: [f64; 3] = [0.25, 1.0, f64::INFINITY];
-/// Longest gap between two contacts that joins their stretch, s: its readings show a missing force
-/// as well.
+/// Longest stretch without contact that counts to the contacts around it, s: the readings of
+/// segments also show what is missing there.
 const BETWEEN: f64 = 0.5;
 /// Time that a segment runs before its readings count, s: five time constants of a contact.
 const LEAD: f64 = 0.1;
 /// Time about a row with contact that counts as contact too, s: readings are noisy, and a bounce is
 /// shorter than a row.
 const ABOUT: f64 = 0.1;
-/// Fewest counted rows of a segment: fewer say little beyond its initial state.
+/// Fewest rows of a segment that count.
 const FEWEST: usize = 4;
 
 /// Cuts a walk into segments of a duration, s, where bodies touch (one flag a row); the rest stays
