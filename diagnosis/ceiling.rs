@@ -72,8 +72,8 @@ pub fn most(left: &[Left]) -> Option<&Left> {
     most.or_else(|| left.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)))
 }
 
-/// Least share that a variable must predict by itself to be named: any two slow series have less in
-/// common.
+/// Least share that a variable must predict by itself to be named: any two slow series have a
+/// smaller share in common.
 const NAMED: f64 = 0.05;
 
 /// Returns how much of a series its variables predict.

@@ -3,8 +3,8 @@
 //! Evidence compares explanations under one noise model, and no machine has exactly that noise.
 //! Differences of hundreds mean less than they say. The probability of a verdict therefore comes
 //! from a logistic regression on training worlds: whether what was named is among the true causes.
-//! It lowers the probability where a search was cut short, and where a gap is left beside what is
-//! named.
+//! It lowers the probability where a search was cut short, and where a gap remains with the named
+//! effects.
 
 mod refit;
 
@@ -28,7 +28,7 @@ pub struct Confidence {
     pub stopped: f64,
     /// Log odds lost per unit of the logarithm of the share of the gap that is left.
     pub gap_left: f64,
-    /// Log odds lost per law named beside the first: all of them have to be true.
+    /// Log odds lost per named law after the first: all of them have to be true.
     pub more_laws: f64,
     /// Largest probability of `none` where tolerances make up for a gap.
     ///
@@ -66,7 +66,7 @@ impl Default for Confidence {
     }
 }
 
-/// What is known of a verdict beside its evidence.
+/// What is known of a verdict besides its evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
     /// Share of the power of the gap that the verdict's replays leave, on held-out logs and without
@@ -82,13 +82,13 @@ pub struct Shown {
 
 /// Probabilities beyond which evidence carries no more information.
 const CLIP: [f64; 2] = [0.02, 0.98];
-/// Largest probability of `unknown` relative to that of the verdict, beside one law named by a
-/// complete search.
+/// Largest ratio of the probability of `unknown` to that of the verdict, if a complete search names
+/// a single law.
 ///
 /// Of 15 such names that left a gap, of the training worlds above, 12 were right.
 const LESS: f64 = 0.9;
-/// Share of a gap's power below which the remainder carries no information: that of the noise
-/// beside a gap of thirty.
+/// Share of a gap's power below which the remainder carries no information: the noise's share in a
+/// gap of thirty.
 const CLOSED: f64 = 1e-3;
 /// Maximum number of listed sets that were only screened.
 const LISTED: usize = 8;
@@ -214,7 +214,7 @@ impl Confidence {
         let of_alike = all().filter(|&(h, alike)| *alike && !holds(h));
         let of_alike: f64 = of_alike.map(|(h, _)| h.probability).sum();
         let marginal = judgement.marginal(&best.labels) + of_alike;
-        // The remaining gap enters by itself, in `Shown::left`.
+        // The remaining gap is an input of its own, `Shown::left`.
         let raw = marginal / (1.0 - judgement.unknown).max(f64::MIN_POSITIVE);
         let first = with + alike;
         let [p, rivals, unknown] = if is_named || is_none {

@@ -36,7 +36,7 @@ const FEWEST_ROWS: usize = 8;
 /// a priori comes first.
 ///
 /// # Errors
-/// When the logs have too few rows to tell anything, a parameter cannot be set or a rollout fails.
+/// When the logs have too few rows for a diagnosis, a parameter cannot be set or a rollout fails.
 pub fn diagnose(
     study: &Study,
     machine: Machine,

@@ -22,7 +22,7 @@ pub struct Claim {
     pub stopped: f64,
     /// Logarithm of the share of the gap that the verdict leaves.
     pub left: f64,
-    /// Number of laws that it names beside the first.
+    /// Number of laws that it names after the first.
     pub more: f64,
 }
 

@@ -76,8 +76,8 @@ fn followers(machine: &Machine, study: &Study) -> Result<Followers> {
 /// Returns the bench of a study, with its noise not yet estimated, and the values of its parameters
 /// in the model as given.
 ///
-/// Where a log gives no initial state, the machine begins at its home, or at rest near it if
-/// replays of the first rows from there leave less.
+/// Where a log gives no initial state, the machine begins at its home. It begins where it comes to
+/// rest from there if replays of the first rows then leave less.
 ///
 /// # Errors
 /// When no log has a reading, or a parameter cannot be set.

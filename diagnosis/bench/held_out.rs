@@ -1,15 +1,15 @@
 //! The misfit of replays to the held-out logs that no choice of initial states can remove.
 //!
-//! An initial state that was fitted on the first tenth of a log has some covariance, and a small
-//! error of it grows over the rest of the log. The misfit is therefore what no initial state makes
-//! up for. It is the squared residuals of the whole log, with the initial state fitted to all of
-//! it, less those of the first tenth, with the initial state fitted to that.
+//! An initial state that was fitted on the first tenth of a log has some covariance. A small error
+//! of it grows over the rest of the log. The misfit is therefore what no initial state makes up
+//! for. It is the squared residuals of the whole log less those of the first tenth, each with the
+//! initial state fitted to that part.
 //!
-//! Where replays are linear in the initial state, this is the squared Mahalanobis distance of the
-//! rest from its prediction, `r' (I + J S J')^-1 r` in units of the noise. `J` are the derivatives
-//! of the rest with respect to the initial state, `S` is the initial state's covariance from the
-//! first tenth. One or two Gauss-Newton steps from the initial state of the first tenth are then
-//! enough.
+//! Where replays are linear in the initial state, the misfit is `r' (I + J S J')^-1 r` in units of
+//! the noise: the squared Mahalanobis distance of the rest from its prediction. `J` are the
+//! derivatives of the rest with respect to the initial state, `S` is the initial state's covariance
+//! from the first tenth. One or two Gauss-Newton steps from the initial state of the first tenth
+//! are then enough.
 //!
 //! Replays that lie far from a log are not linear in the initial state, and derivatives there
 //! promise too much. Where replays do not achieve what the derivatives predict, the initial state
@@ -39,8 +39,8 @@ const PART_BY_PART: usize = 100_000;
 
 /// Shares of the logs to which initial states are fitted, each from the result of the one before.
 ///
-/// If the first tenth leaves an initial state very uncertain, the replay may end so far from the
-/// rest of the log that no derivative leads back from there.
+/// If the first tenth leaves an initial state very uncertain, the replay may end far from the rest
+/// of the log. No derivative leads back from there.
 const SHARES: [f64; 4] = [0.2, 0.4, 0.7, 1.0];
 
 /// An explanation, with its effects as trials.

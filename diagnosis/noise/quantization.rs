@@ -30,11 +30,11 @@ const COARSE: [f64; 2] = [4.0, 16.0];
 /// 4 to 16 steps; `None` for any other.
 ///
 /// While a motion of `v` per row passes the edge of a step, noise of standard deviation `s` moves
-/// the reading back and forth. The reading changes from row to row with probability `2 p (1 - p)`,
-/// where `p` is the normal distribution function of the distance from the edge over `s`. That is `2
-/// s / (v sqrt(pi))` changes per edge, if it is more than one. There are `v / step` edges per row.
-/// The share of rows at which the reading changes therefore gives `s = share step sqrt(pi) / 2`.
-/// With less noise a reading still changes once per edge, so this is an upper bound.
+/// the reading back and forth. The reading changes from row to row with probability `2 p (1 - p)`.
+/// `p` is the normal distribution function of the distance from the edge over `s`. That is `2 s /
+/// (v sqrt(pi))` changes per edge, if it is more than one. There are `v / step` edges per row. The
+/// share of rows at which the reading changes therefore gives `s = share step sqrt(pi) / 2`. With
+/// less noise a reading still changes once per edge, so this is an upper bound.
 #[must_use]
 pub fn noise_before(logs: &Logs, sensor: usize) -> Option<f64> {
     let step = step(logs, sensor);
