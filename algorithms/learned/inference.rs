@@ -5,8 +5,8 @@
 //! Gaussian is truncated to the prior's box `[-b, b]`, like a posterior under a uniform prior:
 //!
 //! ```text
-//! q(z) = N(z; m, s^2) / (Phi((b - m) / s) - Phi((-b - m) / s)),   -b <= z <= b m  = b tanh(o_1),
-//! log s = LOW + (HIGH - LOW) sigmoid(o_2 + OFFSET)
+//! q(z) = N(z; m, s^2) / (Phi((b - m) / s) - Phi((-b - m) / s)),   -b <= z <= b
+//! m    = b tanh(o_1),   log s = LOW + (HIGH - LOW) sigmoid(o_2 + OFFSET)
 //! ```
 //!
 //! With a large `s` it equals the prior, so a network that has learned nothing claims nothing. The

@@ -1,18 +1,20 @@
 //! MaxMI (Kumar et al. 2019, "Estimating mass distribution of articulated objects using
-//! non-prehensile manipulation"): a predictor of the unknowns from the history, and a policy that
-//! is rewarded for lowering its error, trained in turns.
+//! non-prehensile manipulation").
+//!
+//! A predictor estimates the unknowns from the history, and a policy is rewarded for lowering the
+//! predictor's error. Both are trained in turns.
 //!
 //! The predictor is a learned posterior `q(z | history)` ([`crate::inference`]). The reward of a
-//! control step is what it made the truth more likely,
+//! control step is its gain in the log-likelihood of the truth,
 //!
 //! ```text
 //! r_h = log q(z | history to h) - log q(z | history to h - 1),
 //! ```
 //!
-//! so that the return is the lower bound of the mutual information of unknown and episode (Barber
-//! and Agakov 2003), up to the constant of the first reading. The policy sees its readings and what
-//! the predictor makes of them; episodes are simulated once, without the copies that Fisher
-//! information needs.
+//! so the return is the lower bound of the mutual information of unknown and episode (Barber and
+//! Agakov 2003), up to the constant of the first reading. The policy observes its readings and the
+//! predictor's belief. Each episode is simulated once, without the copies that Fisher information
+//! needs.
 
 use std::sync::Arc;
 
@@ -43,30 +45,31 @@ pub struct PredictorSettings {
     pub hidden: Vec<usize>,
     /// Step size of Adam.
     pub learning_rate: f64,
-    /// Decoupled decay of weights a step, relative to the step size (Loshchilov and Hutter 2019).
-    /// Over the training's some 6000 steps 0.3 halves twice what no episode asks for.
+    /// Decoupled weight decay per step, relative to the step size (Loshchilov and Hutter 2019).
+    /// Over the roughly 6000 steps of a training, 0.3 halves weights that no episode supports about
+    /// twice.
     pub weight_decay: f64,
-    /// Episodes of a step of Adam, each cut at a random mark.
+    /// Episodes per step of Adam, each cut at a random mark.
     pub minibatch: usize,
-    /// Steps of Adam after each batch of episodes, from the weights before; those that do not help
-    /// on held-out episodes are taken back.
+    /// Steps of Adam after each batch of episodes, starting from the present weights; steps that do
+    /// not help on held-out episodes are undone.
     pub steps: usize,
-    /// Most steps of Adam of a training from the beginning, which is due at the first batch and
-    /// whenever the episodes have doubled, since the policy comes to move things further than the
-    /// scales of the inputs were made for. It ends earlier once held-out episodes gain nothing.
+    /// Maximum number of steps of Adam of a training from scratch. One takes place at the first
+    /// batch and whenever the number of episodes has doubled, since the policy then moves objects
+    /// further than the input scales allow for. It stops early once held-out episodes gain nothing.
     pub begin_steps: usize,
-    /// Latest episodes that it learns from: what an episode tells does not depend on who acted in
-    /// it, so that all of a training are kept; 100 MB at 40 numbers a mark.
+    /// Number of latest episodes that are kept to learn from. What an episode reveals does not
+    /// depend on who acted in it, so all of a training are kept: 100 MB at 40 numbers per mark.
     pub memory: usize,
-    /// Share of the episodes that are held out: no step is taken along them; they stop the
-    /// training and calibrate what the predictor claims, which is what the policy is paid by.
+    /// Share of the episodes that are held out from the gradient steps. They stop the training and
+    /// calibrate the predictor's claims, which reward the policy.
     pub held_out: f64,
-    /// Latest held-out episodes that do so: late ones, because they are like what comes next; 512
-    /// know the mean information to about 0.03 nats.
+    /// Number of latest held-out episodes that do so. Late ones resemble the coming episodes; 512
+    /// determine the mean information to about 0.03 nats.
     pub judges: usize,
-    /// First episodes, whose control steps are paid if a tracked part was seen to move. A predictor
-    /// that knows nothing pays nothing, and actions at random seldom touch an object: neither the
-    /// policy nor the predictor would have anything to learn from.
+    /// Number of first episodes whose control steps are rewarded if a tracked part was seen to
+    /// move. An untrained predictor rewards nothing and random actions seldom touch an object, so
+    /// neither policy nor predictor would have anything to learn from.
     pub warm_up: usize,
 }
 
@@ -91,16 +94,17 @@ impl Default for PredictorSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaxMi {
-    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
-    /// `shipped` for what ships alone.
+    /// File of a trained policy. Empty: the one that ships, else trained on the spot. `train`:
+    /// train anew. `shipped`: only the one that ships.
     pub policy: String,
     /// Episodes that are simulated at once.
     pub environments: usize,
-    /// The learner of the policy; as that of `fisher-ppo`, so that they differ by the reward alone.
+    /// The learner of the policy, with the settings of `fisher-ppo`, so that the two differ in the
+    /// reward alone.
     pub ppo: PpoConfig,
     /// The predictor.
     pub predictor: PredictorSettings,
-    /// What was trained on the spot; no setting.
+    /// Policy that was trained on the spot; not a setting.
     #[serde(skip)]
     pub cache: Cache,
 }
@@ -206,7 +210,7 @@ impl LearnedExplorer for MaxMi {
     }
 }
 
-/// Readings, with what the predictor makes of them so far.
+/// Observes readings together with the predictor's present belief.
 pub struct Predicting {
     observer: Observer,
     history: History,
@@ -217,7 +221,7 @@ pub struct Predicting {
 }
 
 impl Predicting {
-    /// With a predictor of this problem.
+    /// Observer with a predictor for this problem.
     ///
     /// # Errors
     /// When the scene lacks a channel of the protocol.
@@ -233,12 +237,12 @@ impl Predicting {
         })
     }
 
-    /// Goes on with a predictor that has learned more.
+    /// Replaces the predictor by one that has learned more.
     pub fn set_predictor(&mut self, predictor: Arc<Inference>) {
         self.predictor = predictor;
     }
 
-    /// What is believed after the latest reading.
+    /// Belief after the latest reading.
     #[must_use]
     pub fn beliefs(&self) -> &[Belief] {
         &self.beliefs
