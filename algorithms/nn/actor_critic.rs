@@ -1,10 +1,9 @@
 //! The networks that PPO trains: a Gaussian actor and a critic, on libtorch.
 //!
-//! Two separate tanh networks; the standard deviation of an action is one
-//! trained number for each of its entries, whatever the state. Weights start
-//! orthogonal with the gains that Andrychowicz et al. 2021 ("What matters in
-//! on-policy reinforcement learning?") found to matter: a small last layer
-//! makes the first policy nearly the same everywhere.
+//! Actor and critic are separate tanh networks. The standard deviation of an action is one trained
+//! number per entry, independent of the state. Weights are initialised orthogonally with the gains
+//! that matter according to Andrychowicz et al. 2021 ("What matters in on-policy reinforcement
+//! learning?"): a small last layer makes the first policy nearly the same everywhere.
 
 use std::f64::consts::{E, PI};
 
@@ -28,9 +27,10 @@ pub struct ActorCritic {
     action_len: usize,
 }
 
-/// Gain of the actor's last layer: first actions are near the middle of their range (Andrychowicz et al. 2021).
+/// Gain of the actor's last layer: the first actions are then near the middle of their range
+/// (Andrychowicz et al. 2021).
 const ACTOR_GAIN: f64 = 0.01;
-/// Gain of the critic's last layer, as usual for a linear output.
+/// Gain of the critic's last layer: the usual one for a linear output.
 const CRITIC_GAIN: f64 = 1.0;
 
 impl ActorCritic {
@@ -82,7 +82,7 @@ impl ActorCritic {
         self.actor.forward(observation)
     }
 
-    /// Standard deviations of the entries of an action.
+    /// Standard deviation of each entry of an action.
     pub fn action_std(&self) -> Vec<f64> {
         to_vec(&self.log_std.exp())
     }
@@ -104,7 +104,7 @@ impl ActorCritic {
         (&self.log_std + 0.5 * (2.0 * PI * E).ln()).sum(None::<Kind>)
     }
 
-    /// The actor as plain numbers.
+    /// The actor as a plain-number policy.
     pub fn policy(&self, normaliser: &Normaliser) -> Policy {
         let layers = self.actor.layers.iter().map(Dense::plain).collect();
         let log_std = to_vec(&self.log_std);
@@ -112,13 +112,13 @@ impl ActorCritic {
     }
 }
 
-/// Layers with tanh between them.
+/// Dense layers with tanh between them.
 pub struct Network {
     pub layers: Vec<Dense>,
 }
 
 impl Network {
-    /// Layers of these sizes, inputs first.
+    /// Layers of these sizes, from the inputs on.
     pub fn new(path: &Path<'_>, sizes: &[usize], last_gain: f64, rng: &mut impl Rng) -> Self {
         let last = sizes.len() - 2;
         let layers = sizes.windows(2).enumerate().map(|(i, size)| {
@@ -166,7 +166,7 @@ impl Dense {
         input.linear(&self.weight, Some(&self.bias))
     }
 
-    /// As plain numbers, with the weights `inputs x outputs`.
+    /// The layer as plain numbers, with weights `inputs x outputs`.
     pub fn plain(&self) -> Layer {
         Layer {
             weight: to_vec(&self.weight.transpose(0, 1).contiguous()),
@@ -209,7 +209,7 @@ mod tests {
         policy.act(&observation, &mut action).unwrap();
         let entries: Vec<f32> = observation.iter().map(|&x| x as f32).collect();
         let mean: Vec<f64> = to_vec(&networks.mean(&networks.observations(&entries)));
-        // Single precision; only the order of summation differs.
+        // Tolerance of single precision: only the order of summation differs.
         for (a, m) in action.iter().zip(&mean) {
             assert!((a - m).abs() < 1e-6, "{action:?} {mean:?}");
         }

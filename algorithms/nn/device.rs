@@ -1,4 +1,4 @@
-//! Where networks learn.
+//! Selects the device on which networks are trained.
 
 use asid_core::{Error, Result};
 use asid_learned::PpoConfig;
@@ -7,7 +7,7 @@ use tch::Device;
 /// The device that the settings name.
 ///
 /// # Errors
-/// [`Error::Missing`] where libtorch sees no such device.
+/// [`Error::Missing`] where libtorch does not see this device.
 pub fn device(config: &PpoConfig) -> Result<Device> {
     let index = match config.device.as_str() {
         "cpu" => return Ok(Device::Cpu),

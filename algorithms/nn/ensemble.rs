@@ -1,16 +1,17 @@
-//! An ensemble of probabilistic networks of how a state moves, and how much its members disagree.
+//! An ensemble of probabilistic dynamics networks, and the disagreement of its members.
 //!
-//! Each member gives a Gaussian with a diagonal covariance for the change of the state's places,
-//! given state and action, and is fitted by maximum likelihood from weights and an order of samples
-//! of its own (Chua et al. 2018; Lakshminarayanan et al. 2017). Disagreement is the Jensen-Rényi
-//! divergence of order 2, which has a closed form for Gaussians (Shyam et al. 2019, section 3):
+//! Each member predicts the change of the state's places as a Gaussian with diagonal covariance,
+//! given state and action. It is fitted by maximum likelihood, with its own initial weights and its
+//! own order of samples (Chua et al. 2018; Lakshminarayanan et al. 2017). Disagreement is the
+//! Jensen-Rényi divergence of order 2, which has a closed form for Gaussians (Shyam et al. 2019,
+//! section 3):
 //!
 //! ```text
 //! JRD = H2(sum_i p_i / n) - sum_i H2(p_i) / n,   H2(p) = -log int p^2
 //!     = -log( 1/n^2 sum_ij N(m_i; m_j, S_i + S_j) ) - 1/n sum_i 1/2 log det(4 pi S_i)
 //! ```
 //!
-//! Noise that all members expect alike has no part in it.
+//! Noise that all members expect alike does not contribute.
 
 use std::f64::consts::TAU;
 
@@ -24,29 +25,31 @@ use tch::{Device, Kind, Tensor};
 
 use crate::actor_critic::Dense;
 
-/// Logarithm of the variance that a member may claim, of changes scaled to a variance of 1: from a
-/// thousandth of their deviation to e times it. Chosen here; not taken from a source.
+/// Range of the log-variance that a member may predict, for changes scaled to a variance of 1.
+///
+/// The standard deviation then lies between a thousandth of that of the changes and e times it.
+/// Chosen here; not taken from a source.
 const LOG_VARIANCE: [f64; 2] = [-13.8, 2.0];
 
 /// Largest norm of a gradient, over all parameters of a member.
 const MAX_GRADIENT_NORM: f64 = 5.0;
 
-/// Smallest deviation of an entry that is told from a constant, in its unit.
+/// Smallest standard deviation of an entry that is not treated as constant, in its unit.
 const CONSTANT: f64 = 1e-6;
 
-/// Transitions: state, action and change of the places.
+/// Transitions: state, action and change of the places (the entries that move).
 #[derive(Clone, Debug, Default)]
 pub struct Transitions {
-    /// `n x state`.
+    /// States, `n x state`.
     pub state: Vec<f32>,
-    /// `n x action`.
+    /// Actions, `n x action`.
     pub action: Vec<f32>,
-    /// `n x places`.
+    /// Changes, `n x places`.
     pub change: Vec<f32>,
 }
 
 impl Transitions {
-    /// Those that came after `before`, of which these are a continuation.
+    /// The transitions after those of `before`, which are the first of these.
     pub fn after(&self, before: &Self, widths: Widths) -> Self {
         let n = before.change.len() / widths.places;
         Self {
@@ -57,7 +60,7 @@ impl Transitions {
     }
 }
 
-/// Lengths of a row.
+/// Row lengths of transitions.
 #[derive(Clone, Copy, Debug)]
 pub struct Widths {
     pub state: usize,
@@ -65,7 +68,7 @@ pub struct Widths {
     pub places: usize,
 }
 
-/// Mean and deviation of columns.
+/// Mean and standard deviation of columns.
 struct Scales {
     mean: Tensor,
     std: Tensor,
@@ -92,14 +95,14 @@ struct Member {
     _store: VarStore,
 }
 
-/// What the members predict, each `models x n x places`, of scaled changes.
+/// The members' predictions of scaled changes, each `models x n x places`.
 pub struct Prediction {
     pub mean: Tensor,
     pub variance: Tensor,
 }
 
 impl Prediction {
-    /// The same of the first `places` alone.
+    /// The prediction of the first `places` alone.
     pub fn first(&self, places: usize) -> Self {
         let part = |all: &Tensor| all.narrow(2, 0, places as i64);
         Self {
@@ -109,7 +112,7 @@ impl Prediction {
     }
 }
 
-/// The members with the scales of what they take and give.
+/// The members, with the scales of their inputs and outputs.
 pub struct Ensemble {
     members: Vec<Member>,
     widths: Widths,
@@ -117,7 +120,7 @@ pub struct Ensemble {
 }
 
 impl Ensemble {
-    /// Members with weights drawn from `rng`.
+    /// Members with initial weights drawn from `rng`.
     ///
     /// # Errors
     /// [`Error::Failed`] where libtorch refuses the optimiser.
@@ -208,7 +211,8 @@ impl Ensemble {
         })
     }
 
-    /// Mean divergence of the first `paid` places over transitions, nats; `None` before a fit and of no transition.
+    /// Mean divergence of the first `paid` places over transitions, nats; `None` before a fit and
+    /// without transitions.
     pub fn utility(&self, data: &Transitions, paid: usize) -> Option<f64> {
         let prediction = self.predict(&data.state, &data.action)?;
         let each = divergence(&prediction.first(paid));
@@ -216,8 +220,9 @@ impl Ensemble {
         found.is_finite().then_some(found)
     }
 
-    /// Root of the mean squared error of the mean prediction over that of the prediction that nothing changes,
-    /// places weighted by their scales. `None` before a fit and of no transition.
+    /// Root mean square error of the mean prediction over that of the prediction of no change.
+    ///
+    /// Places are weighted by their scales. `None` before a fit and without transitions.
     pub fn error(&self, data: &Transitions) -> Option<f64> {
         let prediction = self.predict(&data.state, &data.action)?;
         let mean = prediction
@@ -230,7 +235,7 @@ impl Ensemble {
         error.is_finite().then_some(error)
     }
 
-    /// Changes in the state's units for scaled ones, `n x places`.
+    /// Converts scaled changes to the state's units, `n x places`.
     pub fn unscale(&self, scaled: &Tensor) -> Tensor {
         match &self.scales {
             Some(scales) => scaled * &scales[1].std + &scales[1].mean,
@@ -256,12 +261,12 @@ impl Member {
     }
 }
 
-/// The Jensen-Rényi divergence of the members' predictions, `n`, in nats; see the module.
+/// Jensen-Rényi divergence of the members' predictions, `n`, in nats; see the module documentation.
 pub fn divergence(prediction: &Prediction) -> Tensor {
     let Prediction { mean, variance } = prediction;
     let models = mean.size()[0] as f64;
     let dimensions = mean.size()[2] as f64;
-    // Pairs: models x models x n.
+    // Pairs of members: models x models x n.
     let off = mean.unsqueeze(0) - mean.unsqueeze(1);
     let wide = variance.unsqueeze(0) + variance.unsqueeze(1);
     let each: Tensor = off.square() / &wide + wide.log();
@@ -288,9 +293,9 @@ mod tests {
         }
     }
 
-    /// By hand. Two unit Gaussians `d` apart: the square of their mixture integrates to
-    /// `(1 + exp(-d^2 / 4)) / 2 / sqrt(4 pi)`, each square alone to `1 / sqrt(4 pi)`, so the
-    /// divergence is `ln 2 - ln(1 + exp(-d^2 / 4))`: 0 for the same, ln 2 far apart.
+    /// By hand, for two unit Gaussians `d` apart: the square of their mixture integrates to `(1 +
+    /// exp(-d^2 / 4)) / 2 / sqrt(4 pi)`, each square alone to `1 / sqrt(4 pi)`. The divergence is
+    /// therefore `ln 2 - ln(1 + exp(-d^2 / 4))`: 0 at the same mean, ln 2 far apart.
     #[test]
     fn the_divergence_of_two_gaussians_is_known() {
         for d in [0.0, 1.0, 2.5, 40.0] {
@@ -298,7 +303,7 @@ mod tests {
             let expected = 2.0_f64.ln() - (-d * d / 4.0).exp().ln_1p();
             assert!((found - expected).abs() < 1e-12, "{d}: {found} {expected}");
         }
-        // Variances 1 and 4, one mean. Pairs: N(0; 0, 2), N(0; 0, 8), twice N(0; 0, 5).
+        // Variances 1 and 4, equal means. Pairs: N(0; 0, 2), N(0; 0, 8), twice N(0; 0, 5).
         let found = divergence(&prediction(&[0.0, 0.0], &[1.0, 4.0])).double_value(&[0]);
         let at_zero = |variance: f64| 1.0 / (TAU * variance).sqrt();
         let mixture = (at_zero(2.0) + at_zero(8.0) + 2.0 * at_zero(5.0)) / 4.0;
@@ -306,7 +311,7 @@ mod tests {
         assert!((found - (-mixture.ln() - alone)).abs() < 1e-12, "{found}");
     }
 
-    /// Five members, in double and in single precision, against the sums written out over pairs.
+    /// Five members, in double and in single precision, against the explicit sums over pairs.
     #[test]
     fn the_divergence_of_five_members_is_that_of_the_sums() {
         let means: [f64; 5] = [6.030041, 5.741407, 4.648544, 4.870511, 7.051518];
@@ -331,7 +336,8 @@ mod tests {
         }
     }
 
-    /// Two members that agree on the first place and are far apart on the second, such as the hand's.
+    /// Two members that agree on the first place and are far apart on the second, for example the
+    /// hand's.
     #[test]
     fn a_place_that_is_not_paid_for_adds_nothing() {
         let rows = |values: &[f64]| Tensor::from_slice(values).view([2, 1, 2]);
@@ -344,8 +350,8 @@ mod tests {
         assert!(of(&both.first(1)).abs() < 1e-12);
     }
 
-    /// Where all members have seen the world they agree, whatever its noise; where none has been
-    /// they do not.
+    /// Where all members have seen data they agree, whatever the noise; where none has, they
+    /// disagree.
     #[test]
     fn members_disagree_where_nothing_was_seen() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);

@@ -1,4 +1,4 @@
-//! Fits the identifier `estimator`, whose settings and use are in [`asid_learned::estimator`].
+//! Trains the identifier `estimator`; its settings and use are in [`asid_learned::estimator`].
 
 use asid_core::progress::Progress;
 use asid_core::{Parameter, Result};
@@ -17,7 +17,7 @@ inventory::submit! {
     EstimatorTrainer { fit }
 }
 
-/// Learns from the first dataset; the epoch that is best on the second is kept.
+/// Trains on the first dataset and keeps the epoch that is best on the second.
 fn fit(
     settings: &Estimator,
     parameters: &[Parameter],
@@ -76,7 +76,7 @@ fn fit(
     Ok(Fitted { inference, events })
 }
 
-/// Which marks are shown, `rows x marks` of 0 and 1.
+/// Random mask of the marks that are shown, `rows x marks` of 0 and 1.
 pub fn keep(
     rows: usize,
     marks: usize,
@@ -110,7 +110,8 @@ mod tests {
         }
     }
 
-    /// Episodes of `marks` marks that each read `z` with noise `sigma`, and a reading of noise alone.
+    /// Episodes of `marks` marks, each with a reading of `z` with noise `sigma` and a reading of
+    /// pure noise.
     fn episodes(n: usize, marks: usize, sigma: f64, prior: &Parameter, seed: u64) -> Dataset {
         let mut rng = Streams::new(seed).stream("toy");
         let mut data = Dataset {
@@ -125,7 +126,7 @@ mod tests {
             let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
             for _ in 0..marks {
                 let reading = z + sigma * normal();
-                // In some unit and from some origin of its own.
+                // In an arbitrary unit and from an arbitrary origin.
                 data.histories.extend([5.0 + 0.01 * reading, normal()]);
             }
             data.histories.extend(vec![1.0; marks]);
@@ -148,10 +149,10 @@ mod tests {
         (inference, episodes(1000, 4, sigma, &prior, 3))
     }
 
-    /// Linear and Gaussian: the posterior of four readings of noise 0.6 is N(mean of the readings,
-    /// 0.3^2), cut to the prior's box. Information and error of the exact posterior are reached
-    /// within 5 %, its deviation within 10 % in the median; 1000 intervals of 95 % hold the truth
-    /// in 950 of cases, plus or minus 7 (one deviation).
+    /// Linear and Gaussian case: the posterior of four readings of noise 0.6 is N(mean of the
+    /// readings, 0.3^2), truncated to the prior's box. Tolerances: information and error within 5 %
+    /// of the exact posterior's, standard deviation within 10 % in the median. Of 1000 intervals of
+    /// 95 %, 950 hold the truth, plus or minus 7 (one standard deviation).
     #[test]
     fn it_is_calibrated_where_the_posterior_is_known() {
         let (inference, data) = fitted(parameter(Scale::Linear), 0.6);
@@ -172,7 +173,7 @@ mod tests {
             let asid_learned::Belief::Gaussian { mean, std } = inference.beliefs(history)[0] else {
                 panic!("a Gaussian");
             };
-            // Near the edge a cut Gaussian can be written in several ways.
+            // Near the edge different truncated Gaussians are nearly alike.
             if mean.abs() < bound - 0.9 {
                 ratios.push(std / 0.3);
             }
@@ -189,12 +190,12 @@ mod tests {
     }
 
     /// Two models at -1 and 1: with four readings of noise 2 the log-odds are exactly twice their
-    /// mean, and the right one is the more probable with probability Phi(1) = 0.841.
+    /// mean. The true model is the more probable one with probability Phi(1) = 0.841.
     #[test]
     fn a_binary_unknown_has_log_odds() {
         let (inference, data) = fitted(parameter(Scale::Binary([0.0, 1.0])), 2.0);
         let found = score(&inference, &data, 0, 1);
-        // 1000 episodes: one deviation is 0.012.
+        // 1000 episodes: one standard deviation is 0.012.
         assert!((found.coverage95 - 0.841).abs() < 0.04, "{found:?}");
         let mut off = 0.0;
         for history in data.histories.chunks_exact(data.len) {

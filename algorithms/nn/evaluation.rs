@@ -1,4 +1,4 @@
-//! How well a policy does without action noise.
+//! Evaluates a policy without action noise.
 
 use asid_core::{BatchEnvironment, Error, Result, Transition};
 use serde::{Deserialize, Serialize};
@@ -14,16 +14,16 @@ pub struct Evaluation {
     pub mean: f64,
     /// Their standard deviation (divided by their number).
     pub std: f64,
-    /// Environment steps that it took, over the whole batch.
+    /// Environment steps of the evaluation, over the whole batch.
     pub env_steps: usize,
 }
 
-/// Steps of the batch after which an episode that has not ended is a fault.
+/// Steps of the batch after which an episode that has not ended is an error.
 const MAX_STEPS: usize = 100_000;
 
 /// Runs at least `episodes` episodes, the same number in each environment.
 ///
-/// Equal numbers, because counting whichever episodes end first would favour short ones.
+/// The numbers are equal because counting the episodes that end first would favour short ones.
 ///
 /// # Errors
 /// Those of the environment; [`Error::Shape`] where it does not fit the policy;
@@ -72,7 +72,7 @@ pub fn evaluate(
     })
 }
 
-/// Mean and standard deviation; not a number for no values.
+/// Mean and standard deviation; NaN for no values.
 pub(crate) fn mean_and_std(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -1,8 +1,7 @@
-//! Trains the explorer `fisher-ppo`, whose settings and play are in
-//! [`asid_learned::fisher_ppo`].
+//! Trains the explorer `fisher-ppo`; its settings and play are in [`asid_learned::fisher_ppo`].
 //!
-//! The reward of a step is [`Information::reward`](asid_algorithms::fisher::Information::reward). It comes
-//! by way of [`FisherEnvironment`], the batch of episodes in which PPO learns.
+//! The reward of a step is [`Information::reward`](asid_algorithms::fisher::Information::reward).
+//! [`FisherEnvironment`], the batch of episodes in which PPO learns, computes it.
 
 use asid_algorithms::explore::FisherEnvironment;
 use asid_core::registry::{self, Settings};

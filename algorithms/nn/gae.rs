@@ -6,23 +6,22 @@
 //! A_t     = delta_t + gamma * lambda * A_{t+1}
 //! ```
 //!
-//! Both ways in which an episode ends cut the sum. They differ in the value of
-//! the state reached: a terminal state is worth nothing more, a truncated one
-//! is worth what the critic says. Taking the second for the first teaches the
-//! critic that time limits are disasters.
+//! Both ways in which an episode can end cut the sum. They differ in the value of the state
+//! reached: it is zero for a terminal state, and the critic's value for a truncated one. Treating
+//! truncation as termination would teach the critic that time limits are disasters.
 
-/// What a rollout of `steps` steps of `n` environments gave, each array `steps x n`.
+/// Results of a rollout of `steps` steps of `n` environments, each array `steps x n`.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome<'a> {
     /// Rewards.
     pub reward: &'a [f64],
-    /// Values of the states acted in.
+    /// Values of the states in which the actions were taken.
     pub value: &'a [f64],
     /// Values of the states reached, before any reset.
     pub next_value: &'a [f64],
-    /// The state reached is terminal.
+    /// Whether the state reached is terminal.
     pub terminated: &'a [bool],
-    /// The episode was cut by its time limit.
+    /// Whether the episode was cut by its time limit.
     pub truncated: &'a [bool],
 }
 
@@ -39,14 +38,14 @@ pub fn advantages(outcome: Outcome<'_>, n: usize, gamma: f64, lambda: f64) -> Ve
     );
     let mut advantage = vec![0.0; len];
     for i in (0..len).rev() {
-        // The state reached counts unless the episode reached its end there.
+        // The value of the state reached counts unless it is terminal.
         let reached = if outcome.terminated[i] {
             0.0
         } else {
             outcome.next_value[i]
         };
         let delta = outcome.reward[i] + gamma * reached - outcome.value[i];
-        // What came later belongs to this episode only if it went on.
+        // Later advantages belong to this episode only if it continued.
         let ended = outcome.terminated[i] || outcome.truncated[i];
         let later = match advantage.get(i + n) {
             Some(&later) if !ended => later,
@@ -78,7 +77,7 @@ mod tests {
         advantages(outcome, 1, 0.9, 0.8)
     }
 
-    /// Rounding of a few operations on numbers of order one.
+    /// Tolerance: rounding of a few operations on numbers of order one.
     fn assert_close(found: &[f64], expected: &[f64]) {
         for (f, e) in found.iter().zip(expected) {
             assert!((f - e).abs() < 1e-12, "{found:?} should be {expected:?}");

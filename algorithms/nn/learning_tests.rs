@@ -1,4 +1,4 @@
-//! PPO on environments whose best return is known.
+//! PPO on environments with a known best return.
 
 use std::ops::ControlFlow;
 
@@ -17,8 +17,8 @@ fn carry_on(_: &PpoProgress) -> ControlFlow<()> {
 
 /// A point on a line, `x' = x + speed * a`, with the reward `-|x' - goal|`.
 ///
-/// The observation is the start and the goal relative to it, in units and an
-/// offset that a network without normalisation would not like.
+/// The observation is the start, and the goal relative to it, with units and an offset that are
+/// hard to learn without normalisation.
 struct Line {
     x: Vec<f64>,
     goal: Vec<f64>,
@@ -92,7 +92,7 @@ impl BatchEnvironment for Line {
     }
 }
 
-/// Reward 1 a step and nothing to observe: the value is known in closed form.
+/// Reward 1 per step and nothing to observe: the value is known in closed form.
 struct Constant {
     step: usize,
     horizon: usize,
@@ -126,8 +126,8 @@ impl BatchEnvironment for Constant {
     }
 }
 
-/// One-step episodes, where the best return is 0 and doing nothing gives -0.2.
-/// A hundredth of the range of goals is what is asked for.
+/// One-step episodes: the best return is 0, and doing nothing gives -0.2. The tolerance is a
+/// hundredth of the range of goals.
 #[test]
 fn a_one_step_environment_is_solved() {
     let config = PpoConfig {
@@ -143,9 +143,9 @@ fn a_one_step_environment_is_solved() {
     assert!(last.action_std < 0.5, "the policy gets surer: {last:?}");
 }
 
-/// Ten steps to a goal that is up to four steps away. From a distance `d` the best
-/// return is `-sum_k max(0, d - 0.1 k)`, on average -0.175; standing still gives -2.
-/// 64 goals know that average to 0.025, and as much again is left to learn.
+/// Ten steps to a goal that is up to four steps away. From a distance `d` the best return is
+/// `-sum_k max(0, d - 0.1 k)`, on average -0.175; standing still gives -2. 64 goals determine that
+/// average to 0.025; the tolerance leaves as much again for imperfect learning.
 #[test]
 fn a_longer_episode_with_a_time_limit_is_solved() {
     let config = PpoConfig {
@@ -163,9 +163,9 @@ fn a_longer_episode_with_a_time_limit_is_solved() {
     assert!(explained.unwrap() > 0.7, "the critic learns: {explained:?}");
 }
 
-/// With rewards of 1 and gamma = 1/2 a state is worth 1 / (1 - gamma) = 2 if time
-/// limits are only limits. If every second step is terminal, the observation hides
-/// which, and its worth is the mean of 1 and 1 + gamma: 1.25.
+/// With rewards of 1 and gamma = 1/2 the value of a state is 1 / (1 - gamma) = 2 if time limits are
+/// only limits. If every second step is terminal, the observation hides which. The value is then
+/// the mean of 1 and 1 + gamma: 1.25.
 #[test]
 fn a_time_limit_is_worth_more_than_a_terminal_state() {
     let value = |terminates: bool| {
@@ -187,7 +187,7 @@ fn a_time_limit_is_worth_more_than_a_terminal_state() {
         let observation = learnt.networks.observations(&[1.0]);
         learnt.networks.value(&observation).double_value(&[0])
     };
-    // Noise of stochastic gradients at this step size.
+    // Tolerance: noise of stochastic gradients at this step size.
     let (terminated, truncated) = (value(true), value(false));
     assert!((terminated - 1.25).abs() < 0.05, "{terminated}");
     assert!((truncated - 2.0).abs() < 0.05, "{truncated}");
@@ -202,7 +202,7 @@ fn one_seed_gives_one_result_and_another_gives_another() {
         ..PpoConfig::default()
     };
     let run = |seed| train(&mut Line::new(8, 5), &config, seed, &mut carry_on).unwrap();
-    // Two trainings side by side draw from no shared generator.
+    // Two concurrent trainings share no random generator.
     let (first, second) = std::thread::scope(|scope| {
         let other = scope.spawn(|| run(5));
         (run(5), other.join().unwrap())
@@ -232,12 +232,12 @@ fn progress_is_seen_and_can_end_the_training() {
     let steps: Vec<usize> = seen.iter().map(|p| p.env_steps).collect();
     assert_eq!(steps, [128, 256, 384]);
     assert!(trained.evaluation.is_none());
-    // 16 steps of 8 environments with episodes of 5: three ended in each.
+    // 16 steps of 8 environments with episodes of 5 steps: three episodes end in each.
     assert!(seen[0].mean_return.is_some());
 }
 
-/// Ten episodes of eight environments are two of each. A policy that stands
-/// still returns minus the sum of the distances of its goal.
+/// At least ten episodes in eight environments are two in each. A policy that stands still returns
+/// minus the sum of the distances to its goal.
 #[test]
 fn an_evaluation_counts_as_many_episodes_of_each_environment() {
     let layers = vec![Layer {

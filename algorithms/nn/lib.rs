@@ -1,15 +1,12 @@
 //! Neural networks of ASID, on libtorch.
 //!
-//! [`train`] is proximal policy optimisation over any
-//! [`asid_core::BatchEnvironment`]. What it returns, a [`Policy`], is plain
-//! numbers: it acts without libtorch, can be shared between threads, and is
-//! saved. libtorch is used for learning only; what is learned is played and
-//! evaluated by [`asid_learned`], which holds the explorers and the identifier
-//! whose trainers are here.
+//! [`train`] is proximal policy optimisation over any [`asid_core::BatchEnvironment`]. It returns a
+//! [`Policy`] of plain numbers, which acts without libtorch, can be shared between threads, and can
+//! be saved. libtorch is used for training only. [`asid_learned`] plays and evaluates the trained
+//! networks; it holds the explorers and the identifier whose trainers are here.
 //!
-//! Everything here is deterministic: the weights, the action noise and the
-//! order of minibatches come from the seed that is given, never from libtorch's
-//! global generator, and learning on the CPU uses one thread.
+//! Everything here is deterministic. Weights, action noise and the order of minibatches come from
+//! the given seed and never from libtorch's global generator. Training on the CPU uses one thread.
 
 mod actor_critic;
 pub mod device;
@@ -33,7 +30,7 @@ mod predictor;
 mod rollout;
 pub mod surrogate;
 mod task_ppo;
-// The problems that the crate of what plays is tested on.
+// Test problems, shared with the crate that plays.
 #[cfg(test)]
 #[path = "../learned/testing.rs"]
 mod testing;

@@ -1,4 +1,4 @@
-//! Trains the explorer `max`, whose settings and play are in [`asid_learned::max`].
+//! Trains the explorer `max`; its settings and play are in [`asid_learned::max`].
 //!
 //! ```text
 //! warm-up: episodes of random actions
@@ -35,10 +35,12 @@ inventory::submit! {
     Trainer { algorithm: Max::NAME, train }
 }
 
-/// What an observation is made of: `places` entries that move, the first `paid` of them those whose
-/// disagreement is sought; as many changes of them since the last step where `changes`; for each of
-/// `relations`, whose two numbers are the first entries of an object and of the hand, the hand as seen from the object;
-/// and the share of the episode that is over.
+/// Layout of an observation.
+///
+/// It has `places` entries that move; disagreement about the first `paid` of them is rewarded. With
+/// `changes` as many entries with their changes since the last step follow. Then comes, for each of
+/// `relations` (first entries of an object and of the hand), the hand's position relative to the
+/// object. The last entry is the elapsed share of the episode.
 #[derive(Clone, Debug)]
 pub struct Shape {
     pub places: usize,
@@ -49,34 +51,37 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Entries of a state: an observation without the clock.
+    /// Number of entries of a state: an observation without the clock.
     fn state(&self) -> usize {
         self.moving() + 3 * self.relations.len()
     }
 
-    /// Those of them that are places and changes; relations follow.
+    /// Number of these entries that are places and changes; relations follow.
     fn moving(&self) -> usize {
         self.places * if self.changes { 2 } else { 1 }
     }
 }
 
-/// One round as it went.
+/// Results of one round.
 pub struct Round {
     pub policy: Policy,
-    /// Mean divergence that an imagined episode of the trained policy collects, nats.
+    /// Mean divergence that the trained policy collects in an imagined episode, nats.
     pub utility: f64,
-    /// Standard deviation of the same.
+    /// Standard deviation of this divergence.
     pub utility_std: f64,
-    /// Mean divergence that its episodes in the world collect, before the ensemble learns from them, nats.
+    /// Mean divergence that its episodes in the world collect, before the ensemble learns from
+    /// them, nats.
     pub utility_real: f64,
-    /// How well the ensemble foresees a control step of the same episodes; see [`Ensemble::error`].
+    /// Prediction error of the ensemble on the same episodes; see [`Ensemble::error`].
     pub model_error: f64,
-    /// Real control steps so far.
+    /// Control steps in the world so far.
     pub steps: usize,
 }
 
-/// The rounds of MAX in a world whose observations have this shape; its rewards mean nothing.
-/// `told` sees every round and may end the work.
+/// Runs the rounds of MAX in a world whose observations have this shape; the world's own rewards
+/// are ignored.
+///
+/// `told` receives every round and may end the work with an error.
 ///
 /// # Errors
 /// Those of the world and of the learner.
@@ -135,7 +140,7 @@ pub fn explore(
     Ok(rounds)
 }
 
-/// The shape of a problem's exploration: what is tracked is paid for, and the hand is not.
+/// Observation layout of a problem's exploration: the tracked parts are rewarded, the hand is not.
 fn shape(problem: &Problem<'_>) -> Result<Shape> {
     let motion = Motion::new(problem)?;
     Ok(Shape {

@@ -1,4 +1,4 @@
-//! Trains the explorer `maxmi`, whose settings and play are in [`asid_learned::maxmi`].
+//! Trains the explorer `maxmi`; its settings and play are in [`asid_learned::maxmi`].
 //!
 //! ```text
 //! repeat
@@ -31,8 +31,8 @@ inventory::submit! {
     Trainer { algorithm: MaxMi::NAME, train }
 }
 
-/// Pays for what a control step made the truth more likely; as long as there is no predictor, for
-/// what was seen to move.
+/// Rewards the gain in the log-likelihood of the truth; before there is a predictor, it rewards
+/// visible motion.
 struct Gain<'a> {
     problem: &'a Problem<'a>,
     signals: SignalSet,
@@ -41,12 +41,14 @@ struct Gain<'a> {
     /// Whitened difference of two readings.
     difference: Vec<f64>,
     predictor: Predictor<'a>,
-    /// What the predictor claims, calibrated: what pays, and what the policy sees.
+    /// The predictor's calibrated claims; they determine the reward and are part of the
+    /// observation.
     claims: Arc<Inference>,
     /// `log q - log prior` after the latest reading of each episode, nats.
     told: Vec<f64>,
-    /// Of the latest whole episodes, each judged before the predictor learned from it: squared
-    /// error of the predicted mean, that of the prior's mean, and nats, all summed over unknowns.
+    /// Scores of the latest whole episodes, each taken before the predictor learned from it:
+    /// squared error of the predicted mean, that of the prior's mean, and nats, all summed over
+    /// unknowns.
     judged: VecDeque<[f64; 3]>,
 }
 
@@ -63,7 +65,7 @@ impl Gain<'_> {
 }
 
 impl Gain<'_> {
-    /// Whether an episode's tracked readings have changed by more than their noise.
+    /// Whether an episode's tracked readings have changed by more than their noise explains.
     fn moved(&mut self, e: usize, reading: &[f64]) -> bool {
         let width = self.signals.width();
         let [now, before] = [reading, &self.latest[e]].map(|r| &r[..width]);
@@ -116,7 +118,7 @@ impl Pay<Predicting> for Gain<'_> {
     }
 }
 
-/// A predictor that gives the prior whatever it is shown.
+/// A predictor that always gives the prior.
 fn prior(history: &History, parameters: &[Parameter]) -> Inference {
     let layer = Layer {
         weight: vec![0.0; history.len() * 2 * parameters.len()],
@@ -132,7 +134,7 @@ fn prior(history: &History, parameters: &[Parameter]) -> Inference {
     )
 }
 
-/// The environment, its predictor trained on episodes of random actions.
+/// The environment with an untrained predictor.
 fn environment<'a>(
     problem: &'a Problem<'a>,
     explorer: &'a MaxMi,
@@ -194,11 +196,11 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
     Ok(training)
 }
 
-/// Noises of a reading that a difference of two has to exceed for something to have moved: noise alone
-/// does so (a root of two wider) once in 10^5 entries.
+/// Smallest change of a reading, in noise standard deviations, that counts as motion. The noise of
+/// a difference of two readings is larger by sqrt(2); it exceeds this once in 10^5 entries.
 const SEEN: f64 = 6.5;
 
-/// Latest episodes that the predictor's figures are of.
+/// Number of latest episodes that the predictor's figures are computed from.
 const LATEST: usize = 512;
 
 #[cfg(test)]
@@ -227,7 +229,7 @@ mod tests {
         explorer
     }
 
-    /// A file holds policy and predictor, the same seed gives the same, and it can be played.
+    /// The file holds policy and predictor and can be played; equal seeds give equal files.
     #[test]
     fn it_is_trained_saved_and_played() {
         let folder = tempfile::tempdir().unwrap();
@@ -256,8 +258,8 @@ mod tests {
         });
     }
 
-    /// As long as there is no predictor, hands that stay where they are earn nothing; once there is
-    /// one, the rewards of an episode add up to what it gained over it.
+    /// Before there is a predictor, a hand that does not move earns nothing. After that, the
+    /// rewards of an episode add up to its information gain.
     #[test]
     fn the_return_is_the_information_gained() {
         with_problem("rod-balancing", |problem| {
@@ -289,7 +291,7 @@ mod tests {
         });
     }
 
-    /// A reading that is off by six noises has not moved, one that is off by seven has.
+    /// A change of six noise standard deviations is no motion; one of seven is.
     #[test]
     fn motion_is_what_noise_does_not_explain() {
         with_problem("rod-balancing", |problem| {

@@ -1,10 +1,10 @@
-//! A model of a motion that is learned from episodes, and what it predicts open loop: the learned
-//! counterpart of a simulator.
+//! A dynamics model learned from episodes, and its open-loop predictions: the learned counterpart
+//! of a simulator.
 //!
-//! The ensemble is that of [`max`](asid_learned::max): members give a Gaussian for what a control step
-//! changes of the places, given the places, their last changes and the action. An episode is predicted from
-//! its first state and its actions alone, each step from the one before, by the mean over the members'
-//! means.
+//! The ensemble is that of [`max`](asid_learned::max): its members predict, as a Gaussian, the
+//! change of the places in a control step from the places, their last changes and the action. An
+//! episode is predicted from its first state and its actions alone. Each step starts from the
+//! previous prediction and uses the mean over the members' means.
 
 use asid_core::{Error, Result};
 use asid_learned::max::EnsembleSettings;
@@ -15,16 +15,17 @@ use tch::Kind;
 use crate::actor_critic::to_vec;
 use crate::ensemble::{Ensemble, Transitions, Widths};
 
-/// An episode as a model of the motion sees it.
+/// An episode as input of a dynamics model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// Entries that move, one row more than there are actions: at the start and after each control step.
+    /// Rows of the entries that move: at the start and after each control step, so one row more
+    /// than actions.
     pub places: Vec<Vec<f64>>,
     /// Actions, each entry between -1 and 1.
     pub actions: Vec<Vec<f64>>,
 }
 
-/// A learned model of the motion.
+/// A learned dynamics model.
 pub struct MotionModel {
     ensemble: Ensemble,
 }
@@ -33,8 +34,9 @@ impl MotionModel {
     /// Fits an ensemble to all control steps of the episodes.
     ///
     /// # Errors
-    /// [`Error::Shape`] where the episodes do not have rows of one length, and one row more than actions;
-    /// [`Error::Failed`] where there is nothing to learn from or libtorch fails.
+    /// [`Error::Shape`] where the rows of the episodes differ in length, or an episode does not
+    /// have one row more than actions. [`Error::Failed`] where there is nothing to learn from or
+    /// libtorch fails.
     pub fn fit(settings: &EnsembleSettings, episodes: &[Motion], seed: u64) -> Result<Self> {
         let first = episodes.iter().find(|e| !e.actions.is_empty());
         let Some(first) = first else {
@@ -55,7 +57,8 @@ impl MotionModel {
         Ok(Self { ensemble })
     }
 
-    /// Places of an episode that begins at rest at `start` under `actions`: `start`, then a row after each.
+    /// Predicted places of an episode that starts at rest at `start`: `start`, then one row after
+    /// each action.
     ///
     /// # Errors
     /// [`Error::Failed`] where a prediction is not finite.
@@ -89,7 +92,7 @@ impl MotionModel {
     }
 }
 
-/// Adds the control steps of an episode; those with a missing reading are left out.
+/// Adds the control steps of an episode; steps with a missing reading are left out.
 fn add(episode: &Motion, widths: Widths, data: &mut Transitions) -> Result<()> {
     let fits = episode.places.len() == episode.actions.len() + 1
         && episode.places.iter().all(|p| p.len() == widths.places)
@@ -121,8 +124,8 @@ mod tests {
 
     use super::*;
 
-    /// A cart whose change decays by a tenth a step and grows with the push: `d' = 0.9 d + 0.1 a`. With a
-    /// stop at `x = 2`, which no episode of learning gets to.
+    /// A cart whose velocity decays by a tenth per step and grows with the push: `d' = 0.9 d + 0.1
+    /// a`. A stop at `x = 2` is never reached in training.
     fn cart(start: f64, actions: &[Vec<f64>]) -> Motion {
         let (mut x, mut d) = (start, 0.0);
         let mut places = vec![vec![x]];
@@ -145,7 +148,7 @@ mod tests {
         (found[last][0] - truth.places[last][0]).abs()
     }
 
-    /// Where it has learned it predicts; a stop that it never met it runs through.
+    /// It predicts well where it was trained, and passes through a stop that it never met.
     #[test]
     fn it_predicts_what_it_has_seen_and_not_what_it_has_not() {
         let settings = EnsembleSettings {
@@ -167,7 +170,7 @@ mod tests {
         let push = vec![vec![1.0]; 20];
         let outside = error(&model, &cart(0.0, &push));
         assert!(outside > 5.0 * inside, "{outside} {inside}");
-        // The same seed, the same model.
+        // Equal seeds give equal models.
         let again = MotionModel::fit(&settings, &learned, 1).unwrap();
         let [a, b] = [&model, &again].map(|m| m.predict(&[0.0], &push).unwrap());
         assert_eq!(a, b);

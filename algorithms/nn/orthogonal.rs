@@ -1,7 +1,7 @@
 //! Orthogonal initial weights (Saxe et al. 2014), drawn from the caller's generator.
 //!
-//! libtorch's own initialisation draws from a generator that is global to the
-//! process, which two trainings side by side would race for.
+//! libtorch's own initialisation uses a generator that is global to the process; two concurrent
+//! trainings would race for it.
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -29,7 +29,7 @@ pub fn orthogonal(rows: usize, cols: usize, gain: f64, rng: &mut impl Rng) -> Ve
             vectors.push(vector);
         }
     }
-    // One vector is a row, or a column where there are more rows than columns.
+    // Each vector is a row, or a column where there are more rows than columns.
     let mut matrix = vec![0.0; rows * cols];
     for (i, vector) in vectors.iter().enumerate() {
         for (j, v) in vector.iter().enumerate() {
@@ -67,7 +67,7 @@ mod tests {
                         })
                         .sum();
                     let expected = if i == j { 4.0 } else { 0.0 };
-                    // Single precision of numbers of order one, summed.
+                    // Tolerance: single precision of a sum of numbers of order one.
                     assert!(
                         (product - expected).abs() < 1e-5,
                         "{rows}x{cols}: {product}"

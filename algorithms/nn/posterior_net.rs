@@ -9,7 +9,7 @@ use tch::{Device, Kind, Tensor};
 
 use crate::actor_critic::{Dense, Network};
 
-/// Gain of the last layer: small, so that training begins at the prior.
+/// Gain of the last layer: a small one, so that training starts at the prior.
 const LAST_GAIN: f64 = 0.01;
 
 /// Largest norm of a gradient, over all parameters together.
@@ -35,7 +35,7 @@ pub struct PosteriorNet {
 }
 
 impl PosteriorNet {
-    /// A network for histories like those of `data`.
+    /// Creates a network for histories like those of `data`.
     ///
     /// # Errors
     /// [`Error::Failed`] where libtorch refuses the optimiser.
@@ -67,7 +67,7 @@ impl PosteriorNet {
         })
     }
 
-    /// Episodes as this network takes them.
+    /// Converts episodes to the network's inputs and targets.
     pub fn rows(&self, data: &Dataset) -> Rows {
         let mut input = Vec::with_capacity(data.histories.len());
         for history in data.histories.chunks_exact(data.len) {
@@ -82,13 +82,13 @@ impl PosteriorNet {
         }
     }
 
-    /// A copy of all weights, for [`Self::set_weights`].
+    /// Copies all weights, for [`Self::set_weights`].
     pub fn weights(&self) -> Vec<Tensor> {
         let all = self.store.trainable_variables();
         all.iter().map(|t| t.detach().copy()).collect()
     }
 
-    /// Goes back to weights that it had.
+    /// Restores weights from [`Self::weights`].
     pub fn set_weights(&mut self, weights: &[Tensor]) {
         tch::no_grad(|| {
             for (mut t, kept) in self.store.trainable_variables().into_iter().zip(weights) {
@@ -102,8 +102,9 @@ impl PosteriorNet {
         self.optimiser.set_lr(rate);
     }
 
-    /// One step of Adam on some rows, of which only the marks with `keep` (`rows x marks`, 0 or 1)
-    /// are shown; returns the loss.
+    /// Takes one step of Adam on some rows; returns the loss.
+    ///
+    /// With `keep` (`rows x marks`, 0 or 1) only the marked marks are shown.
     pub fn step(&mut self, rows: &Rows, keep: Option<&Tensor>) -> f64 {
         let loss = match keep {
             None => self.loss(rows),
@@ -129,7 +130,7 @@ impl PosteriorNet {
         -sum / self.parameters.len() as f64
     }
 
-    /// Inputs with the marks that are not kept set to what a missing mark is.
+    /// Inputs in which marks that are not kept have the values of missing marks.
     fn shown(&self, input: &Tensor, keep: &Tensor) -> Tensor {
         let (n, marks) = (input.size()[0], self.marks as i64);
         let entries = self.scales.0.len() as i64;
@@ -150,8 +151,8 @@ impl PosteriorNet {
     }
 }
 
-/// `log q(z) - log prior(z)`, `n`, of the outputs of one unknown; the formula is that of
-/// [`asid_learned::inference`].
+/// `log q(z) - log prior(z)`, `n`, from the outputs for one unknown; see
+/// [`asid_learned::inference`] for the formula.
 fn log_ratio(first: &Tensor, second: &Tensor, z: &Tensor, binary: bool) -> Tensor {
     if binary {
         return (z * first).log_sigmoid() + std::f64::consts::LN_2;
@@ -176,7 +177,7 @@ mod tests {
 
     use super::*;
 
-    /// The loss that is descended is the density that plain numbers evaluate.
+    /// The training loss equals the density that the plain network evaluates.
     #[test]
     fn the_density_is_that_of_the_plain_network() {
         for (first, second, z) in [(0.3, 0.5, -0.2), (-1.2, -2.0, -1.4), (2.0, 3.0, 1.0)] {

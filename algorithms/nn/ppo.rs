@@ -10,8 +10,8 @@
 //!         and descend the squared error of the critic
 //! ```
 //!
-//! A time limit is not a failure: a truncated episode is worth what the critic
-//! says of the state it reached. Rewards have a constant scale.
+//! A time limit is not a failure: a truncated episode has the critic's value of the state it
+//! reached. Rewards have a constant scale.
 
 use std::ops::ControlFlow;
 
@@ -33,15 +33,15 @@ use asid_learned::Normaliser;
 use asid_learned::Policy;
 use asid_learned::PpoConfig;
 
-/// One point of the learning curve: what one update did.
+/// One point of the learning curve: the result of one update.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PpoProgress {
     /// Environment steps so far, over the whole batch.
     pub env_steps: usize,
     /// Environment steps to train for.
     pub total_steps: usize,
-    /// Mean undiscounted, unscaled return of the episodes that ended in this
-    /// rollout; none where no episode ended.
+    /// Mean undiscounted, unscaled return of the episodes that ended in this rollout; `None` where
+    /// no episode ended.
     pub mean_return: Option<f64>,
     /// Standard deviation of those returns.
     pub return_std: Option<f64>,
@@ -59,33 +59,32 @@ pub struct PpoProgress {
     pub clip_fraction: f64,
     /// Entropy of an action, in nats.
     pub entropy: f64,
-    /// Share of the variance of the critic's targets that it explained before
-    /// the update; none where the targets do not vary.
+    /// Share of the variance of the critic's targets that it explained before the update; `None`
+    /// where the targets do not vary.
     pub explained_variance: Option<f64>,
 }
 
-/// What [`train`] returns.
+/// Result of [`train`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trained {
     /// The policy, with the normaliser of its observations.
     pub policy: Policy,
-    /// One point an update.
+    /// One point per update.
     pub curve: Vec<PpoProgress>,
-    /// Returns without action noise, after training; none where the settings ask for no episode.
+    /// Returns without action noise, after training; `None` where the settings ask for no episodes.
     pub evaluation: Option<Evaluation>,
 }
 
 /// Trains a policy on `environment`.
 ///
-/// `on_progress` sees every point of the curve; [`ControlFlow::Break`] ends the
-/// training there, and what has been learnt so far is evaluated and returned.
-/// On the CPU, equal seeds (and equal environments) give equal results: libtorch
-/// is set to one thread, for the process.
+/// `on_progress` receives every point of the curve. [`ControlFlow::Break`] ends the training there;
+/// the policy so far is then evaluated and returned. On the CPU, equal seeds (and equal
+/// environments) give equal results: libtorch is set to one thread for the whole process.
 ///
 /// # Errors
-/// [`Error::Config`] for settings out of their domain, [`Error::Missing`] for a
-/// device that is not there, those of the environment, and [`Error::Failed`]
-/// where an observation, a reward or the policy stops being finite.
+/// [`Error::Config`] for settings out of their domain, [`Error::Missing`] for a device that does
+/// not exist, those of the environment, and [`Error::Failed`] where an observation, a reward or the
+/// policy is no longer finite.
 pub fn train(
     environment: &mut dyn BatchEnvironment,
     config: &PpoConfig,
@@ -105,7 +104,7 @@ pub fn train(
     })
 }
 
-/// Networks and curve, before they become a [`Trained`].
+/// Networks and learning curve of a training, before they become a [`Trained`].
 pub(crate) struct Learnt {
     pub networks: ActorCritic,
     pub normaliser: Normaliser,
@@ -168,7 +167,7 @@ pub(crate) fn learn(
     })
 }
 
-/// Independent generators of one seed: weights, action noise, order of samples.
+/// Independent generators from one seed: weights, action noise, order of samples.
 fn streams(seed: u64) -> [ChaCha8Rng; 3] {
     [0, 1, 2].map(|stream| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -177,19 +176,19 @@ fn streams(seed: u64) -> [ChaCha8Rng; 3] {
     })
 }
 
-/// One rollout as the update takes it, one row a sample.
+/// Samples of one rollout, as an update uses them, one row per sample.
 struct Samples {
     observation: Tensor,
     action: Tensor,
     old_log_prob: Tensor,
     advantage: Tensor,
-    /// What the critic should say: advantage plus its old value.
+    /// Target of the critic: advantage plus its old value.
     target: Tensor,
     explained_variance: Option<f64>,
 }
 
 impl Samples {
-    /// Values, advantages and old densities of a rollout, each in one pass.
+    /// Computes values, advantages and old log-densities of a rollout, each in one pass.
     fn new(rollout: &Rollout, networks: &ActorCritic, n: usize, config: &PpoConfig) -> Self {
         tch::no_grad(|| {
             let observation = networks.observations(&rollout.observation);
@@ -245,7 +244,7 @@ struct Losses {
     value: f64,
 }
 
-/// Epochs of minibatches over the samples; returns how far the policy moved, and the losses.
+/// Runs the epochs of minibatches over the samples; returns the shift of the policy and the losses.
 fn update(
     optimiser: &mut Optimizer,
     networks: &ActorCritic,
@@ -289,7 +288,7 @@ fn update(
     (moved(), mean(sum, minibatches))
 }
 
-/// Equation 9 of the paper, with its sign turned, and its two losses.
+/// Equation 9 of the paper with its sign reversed, and its two losses.
 fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> (Tensor, Losses) {
     let log_prob = networks.log_prob(&part.observation, &part.action);
     let advantage = if config.normalise_advantage && part.len() > 1 {
@@ -314,7 +313,7 @@ fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> (Tensor, 
     (loss, losses)
 }
 
-/// The point of the curve after an update.
+/// The learning-curve point after an update.
 fn progress(
     collector: &Collector<'_>,
     rollout: &Rollout,

@@ -1,10 +1,10 @@
-//! The task action by proximal policy optimisation: a policy that answers to the start
-//! pose that is seen.
+//! Solves for the task action by proximal policy optimisation: a policy that responds to the
+//! observed start pose.
 //!
-//! An attempt is one action, so an episode has one step (a contextual bandit): the
-//! observation is the start pose as the trackers show it, the reward minus the task's
-//! cost. Every episode draws the unknowns from the belief, the start pose from its range and
-//! the readings' noise anew. With the prior as the belief this is domain randomisation.
+//! An attempt is one action, so an episode has one step (a contextual bandit). The observation is
+//! the start pose as the trackers show it; the reward is minus the task's cost. Every episode draws
+//! the unknowns from the belief, the start pose from its range, and the readings' noise anew. With
+//! the prior as the belief this is domain randomisation.
 
 use std::ops::ControlFlow;
 
@@ -30,8 +30,8 @@ use asid_learned::PpoConfig;
 pub struct PpoSolver {
     /// Attempts that are simulated at once.
     pub environments: usize,
-    /// The learner. Its `reward_scale` is on top of a scale that gives the costs of the first
-    /// actions, spread over the whole range, a deviation of 1.
+    /// The learner. Its `reward_scale` multiplies an automatic scale that gives the costs of
+    /// uniformly random first actions a standard deviation of 1.
     pub ppo: PpoConfig,
 }
 
@@ -125,7 +125,7 @@ impl TaskPolicy for Learnt<'_> {
     }
 }
 
-/// From entries in `[-1, 1]`, row after row, to the ranges of an action.
+/// Maps entries in `[-1, 1]`, row after row, to the ranges of an action.
 fn span(coordinates: &[Coordinate], rows: &mut [f64]) {
     for (a, c) in rows.iter_mut().zip(coordinates.iter().cycle()) {
         *a = c.at((*a + 1.0) / 2.0);
@@ -135,12 +135,12 @@ fn span(coordinates: &[Coordinate], rows: &mut [f64]) {
 /// Attempts as one-step episodes.
 struct Bandit<'a> {
     attempts: Attempts<'a>,
-    /// Those that wait for an action.
+    /// The situations that await an action.
     situations: Situations,
     action: &'a [Coordinate],
-    /// Entries of a start pose.
+    /// Number of entries of a start pose.
     width: usize,
-    /// Attempts at once.
+    /// Number of simultaneous attempts.
     size: usize,
     rng: Rng,
     trials: Vec<Trial>,
@@ -149,7 +149,7 @@ struct Bandit<'a> {
 }
 
 impl Bandit<'_> {
-    /// Deviation of the costs of uniform actions, 1 where all cost the same.
+    /// Standard deviation of the costs of uniformly random actions; 1 where all costs are equal.
     fn spread(&mut self) -> Result<f64> {
         self.situations = self.attempts.draw(self.size, &mut self.rng)?;
         let uniform: Vec<f64> = (0..self.size * self.action.len())
@@ -159,13 +159,13 @@ impl Bandit<'_> {
         Ok(if std > 0.0 { std } else { 1.0 })
     }
 
-    /// Costs of actions in `[-1, 1]` in the situations that wait.
+    /// Costs of actions in `[-1, 1]` in the situations that await an action.
     fn attempt(&mut self, actions: &[f64]) -> Result<Vec<f64>> {
         let mut scaled = actions.to_vec();
         span(self.action, &mut scaled);
         let rows: Vec<&[f64]> = scaled.chunks_exact(self.action.len()).collect();
         let mut costs = self.attempts.costs(&self.situations, &rows)?;
-        // An attempt that diverged costs what the worst of its batch does.
+        // A diverged attempt costs as much as the worst of its batch.
         let finite = costs.iter().copied().filter(|c| c.is_finite());
         let worst = finite.fold(f64::NEG_INFINITY, f64::max);
         if worst == f64::NEG_INFINITY {
@@ -215,7 +215,7 @@ impl BatchEnvironment for Bandit<'_> {
         }
         transition.terminated.fill(true);
         transition.truncated.fill(false);
-        // Where an episode ended there is nothing to see; the next one begins.
+        // There is nothing to observe at the end of an episode; the next one begins.
         transition
             .final_observation
             .copy_from_slice(&transition.observation);

@@ -1,5 +1,5 @@
-//! The solver on a task whose best action is known: a cart of mass `m` is pushed with a force `F` for
-//! half a second, `x = x_0 + F t^2 / (2 m)`, and its cost is the squared distance from a goal.
+//! The solver on a task with a known best action: a cart of mass `m` is pushed with a force `F` for
+//! half a second, `x = x_0 + F t^2 / (2 m)`; the cost is the squared distance from a goal.
 
 use std::sync::atomic::AtomicU64;
 
@@ -116,7 +116,7 @@ impl Task for Cart {
     }
 }
 
-/// The force that a trained policy answers with to each start, and the attempts that it took.
+/// Returns the force of a trained policy for each start, and the number of attempts.
 fn answers(masses: &[f64], starts: &[f64]) -> (Vec<f64>, usize) {
     let task = Cart::new();
     let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
@@ -148,7 +148,7 @@ fn answers(masses: &[f64], starts: &[f64]) -> (Vec<f64>, usize) {
     (starts.iter().map(act).collect(), solved.trials.len())
 }
 
-/// `F = 2 m (GOAL - x_0) / t^2` for the start that is seen, to 5 % of the range of forces.
+/// `F = 2 m (GOAL - x_0) / t^2` for the observed start, to 5 % of the range of forces.
 #[test]
 fn the_best_action_is_found_for_each_start() {
     let starts = [-0.08, 0.0, 0.08];
@@ -157,12 +157,12 @@ fn the_best_action_is_found_for_each_start() {
         let best = 2.0 * (GOAL - start) / 0.25;
         assert!((force - best).abs() < 0.2, "{start}: {force}, best {best}");
     }
-    // Those of training and one batch that measures the costs' scale.
+    // The attempts of the training, and one batch that measures the scale of the costs.
     assert_eq!(attempts, 2048 + 64);
 }
 
-/// The best force for two masses that are as likely minimises the mean cost of both:
-/// `F = c (1/m_1 + 1/m_2) / (1/m_1^2 + 1/m_2^2)` with `c = 2 (GOAL - x_0) / t^2`.
+/// The best force for two equally probable masses minimises the mean cost of both: `F = c (1/m_1 +
+/// 1/m_2) / (1/m_1^2 + 1/m_2^2)` with `c = 2 (GOAL - x_0) / t^2`.
 #[test]
 fn a_belief_is_averaged_over() {
     let (forces, _) = answers(&[0.8, 1.25], &[0.0]);

@@ -1,9 +1,10 @@
-//! MaxMI's predictor while it learns: it goes on with what it has, and what it claims is what it
-//! was seen to know of episodes that it did not learn from.
+//! Training of MaxMI's predictor, which continues from its present weights; its claims are
+//! calibrated on episodes that it did not learn from.
 //!
-//! A policy that is paid by a predictor is paid for whatever the predictor made up. So a share of
-//! the episodes is held out: a step of training that does not help on these is taken back, and the
-//! deviations are calibrated on them. A history that tells nothing then pays nothing.
+//! The policy's reward is computed from the predictor's claims, so an overconfident predictor would
+//! be exploited. A share of the episodes is therefore held out: a training step that does not help
+//! on these is undone, and the standard deviations are calibrated on them. An uninformative history
+//! then earns nothing.
 
 use std::sync::Arc;
 
@@ -18,30 +19,30 @@ use tch::Tensor;
 use crate::estimator::keep;
 use crate::posterior_net::{PosteriorNet, Rows};
 
-/// Steps of Adam between two looks at the held-out episodes.
+/// Steps of Adam between two evaluations on the held-out episodes.
 const LOOK: usize = 10;
 
-/// Looks without a gain after which a training is over.
+/// Evaluations without a gain after which a training ends.
 const PATIENCE: usize = 10;
 
-/// The predictor with the episodes that it learns from.
+/// The predictor, with the episodes that it learns from.
 pub struct Predictor<'a> {
     settings: &'a PredictorSettings,
     parameters: &'a [Parameter],
     /// Whole episodes to learn from.
     training: Dataset,
-    /// Episodes that stop and calibrate, each whole and up to a random mark.
+    /// Held-out episodes that stop and calibrate; each is stored whole and up to a random mark.
     held_out: Dataset,
-    /// Episodes so far.
+    /// Number of episodes so far.
     seen: usize,
-    /// Episodes to learn from at the latest training from the beginning.
+    /// Number of training episodes at the latest training from scratch.
     begun_with: usize,
     net: Option<PosteriorNet>,
     rng: ChaCha8Rng,
 }
 
 impl<'a> Predictor<'a> {
-    /// That of histories shaped like those of `shape`, which are none.
+    /// Predictor for histories with the layout of `shape`, which holds no episode.
     pub fn new(
         settings: &'a PredictorSettings,
         parameters: &'a [Parameter],
@@ -61,9 +62,9 @@ impl<'a> Predictor<'a> {
         }
     }
 
-    /// Takes an episode in, to learn from or to be held out.
+    /// Stores an episode, to learn from or to be held out.
     pub fn remember(&mut self, history: &[f64], truth: &[f64]) {
-        // Evenly spaced, the first one is held out.
+        // Held-out episodes are evenly spaced; the first one is held out.
         let due = |n: usize| (n as f64 * self.settings.held_out).ceil();
         let holds_out = due(self.seen + 1) > due(self.seen);
         self.seen += 1;
@@ -81,18 +82,18 @@ impl<'a> Predictor<'a> {
         data.truths.extend_from_slice(truth);
     }
 
-    /// Whether the episodes of random actions are over.
+    /// Whether the first episodes, which are rewarded for motion, are over.
     pub fn is_warm(&self) -> bool {
         self.seen >= self.settings.warm_up
     }
 
-    /// Learns from what is remembered, and says what it now claims.
+    /// Learns from the stored episodes; returns the predictor with its present claims.
     ///
     /// # Errors
-    /// Those of libtorch, and where fewer than two episodes are remembered.
+    /// Those of libtorch, and where fewer than two episodes are stored.
     pub fn learn(&mut self) -> Result<Arc<Inference>> {
         forget(&mut self.training, self.settings.memory);
-        // Each is held twice: whole and in part.
+        // Each is stored twice: whole and in part.
         forget(&mut self.held_out, 2 * self.settings.judges);
         let n = self.training.episodes();
         if n == 0 || self.held_out.episodes() == 0 {
@@ -106,8 +107,8 @@ impl<'a> Predictor<'a> {
             None => self.begin()?,
         };
         if n >= 2 * self.begun_with {
-            // The scales of the inputs are those of the episodes at the beginning, and a policy
-            // that learns moves things further: twice the episodes are worth another beginning.
+            // The input scales are those of the episodes at the beginning, and an improving policy
+            // moves objects further. Twice as many episodes justify a new training from scratch.
             let mut other = self.begin()?;
             let loss = self.improve(&mut other, self.settings.begin_steps);
             if loss < held_out_loss(&net, &net.rows(&self.held_out)) {
@@ -122,7 +123,7 @@ impl<'a> Predictor<'a> {
         Ok(Arc::new(plain))
     }
 
-    /// A network that knows nothing yet.
+    /// A new, untrained network.
     fn begin(&mut self) -> Result<PosteriorNet> {
         let settings = self.settings;
         let rates = (settings.learning_rate, settings.weight_decay);
@@ -136,8 +137,9 @@ impl<'a> Predictor<'a> {
         )
     }
 
-    /// Learns for at most so many steps of Adam; the weights that are best on the held-out
-    /// episodes stay, be they those it came with. Returns their loss.
+    /// Trains for at most `steps` steps of Adam and returns the loss on the held-out episodes.
+    ///
+    /// The weights that are best on the held-out episodes are kept; these may be the initial ones.
     fn improve(&mut self, net: &mut PosteriorNet, steps: usize) -> f64 {
         let (rows, held_out) = (net.rows(&self.training), net.rows(&self.held_out));
         let (n, marks) = (self.training.episodes(), self.training.marks);
@@ -153,7 +155,7 @@ impl<'a> Predictor<'a> {
                 input: rows.input.index_select(0, &index),
                 truth: rows.truth.index_select(0, &index),
             };
-            // Each episode is shown up to a mark of its own.
+            // Each episode is shown up to its own random mark.
             let mut last = 0;
             let keep = keep(size, marks, &mut self.rng, |rng, mark| {
                 if mark == 0 {
@@ -184,7 +186,7 @@ fn held_out_loss(net: &PosteriorNet, rows: &Rows) -> f64 {
     tch::no_grad(|| net.loss(rows)).double_value(&[])
 }
 
-/// Lets the oldest episodes go.
+/// Drops the oldest episodes.
 fn forget(data: &mut Dataset, most: usize) {
     let over = data.episodes().saturating_sub(most);
     if over > 0 {
@@ -192,7 +194,7 @@ fn forget(data: &mut Dataset, most: usize) {
     }
 }
 
-/// Makes all but the first marks of a history unknown.
+/// Sets all but the first `shown` marks of a history to unknown.
 fn cut(history: &mut [f64], shape: &Dataset, shown: usize) {
     let (entries, masks) = history.split_at_mut(shape.entries);
     let from = |len: usize| len / shape.marks * shown;
@@ -229,8 +231,9 @@ mod tests {
         }
     }
 
-    /// What is claimed after 20 batches of 64 episodes, and 500 episodes that it has not seen;
-    /// each reading is `gain` times the unknown, with noise that shrinks from mark to mark.
+    /// Returns the predictor after 20 batches of 64 episodes, and 500 new episodes.
+    ///
+    /// Each reading is `gain` times the unknown, with noise that shrinks from mark to mark.
     fn learned(gain: f64, hidden: usize) -> (Arc<Inference>, Vec<(Vec<f64>, f64)>) {
         let parameters = [prior()];
         let settings = PredictorSettings {
@@ -269,8 +272,8 @@ mod tests {
         data
     }
 
-    /// The error on new episodes is below half of that of the prior's mean at the end, and the
-    /// more it has seen the less it is.
+    /// The final error on new episodes is below half of that of the prior's mean, and it decreases
+    /// with the number of marks seen.
     #[test]
     fn the_predictor_beats_the_priors_mean_by_a_factor() {
         let (inference, fresh) = learned(1.0, 32);
@@ -282,8 +285,8 @@ mod tests {
         );
     }
 
-    /// Readings of noise alone, and a network that could learn every one of them by heart: it
-    /// claims the prior. 500 episodes: error and information are known to about 0.01.
+    /// Readings of pure noise, and a network large enough to memorise them: it claims the prior.
+    /// With 500 episodes error and information have a standard error of about 0.01.
     #[test]
     fn of_noise_it_claims_nothing() {
         let (inference, fresh) = learned(0.0, 512);
@@ -294,7 +297,7 @@ mod tests {
         }
     }
 
-    /// Of 100 episodes 20 are held out, whole and in part; of both the oldest go.
+    /// Of 100 episodes 20 are held out, whole and in part; the oldest of both sets are dropped.
     #[test]
     fn a_share_is_held_out_and_the_oldest_go() {
         let parameters = [prior()];

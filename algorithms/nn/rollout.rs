@@ -1,4 +1,4 @@
-//! Gathering samples: the policy acts in a batch of environments.
+//! Collects samples: the policy acts in a batch of environments.
 
 use asid_core::{BatchEnvironment, Error, Result, Transition};
 use rand_chacha::ChaCha8Rng;
@@ -10,11 +10,11 @@ use asid_learned::Normaliser;
 /// Samples of one rollout, each array `steps x n` (times the entries of a row).
 #[derive(Default)]
 pub struct Rollout {
-    /// Normalised observations acted on.
+    /// Normalised observations that were acted on.
     pub observation: Vec<f32>,
-    /// Normalised observations reached, before any reset.
+    /// Normalised observations that were reached, before any reset.
     pub next_observation: Vec<f32>,
-    /// Sampled actions before clipping: what the density is of.
+    /// Sampled actions before clipping; the log-densities refer to these.
     pub action: Vec<f32>,
     /// Scaled rewards.
     pub reward: Vec<f64>,
@@ -24,7 +24,7 @@ pub struct Rollout {
     pub episode_returns: Vec<f64>,
 }
 
-/// Steps the environments and remembers where they are between rollouts.
+/// Steps the environments and keeps their state between rollouts.
 pub struct Collector<'a> {
     environment: &'a mut dyn BatchEnvironment,
     transition: Transition,
@@ -69,19 +69,19 @@ impl<'a> Collector<'a> {
         })
     }
 
-    /// Environments in the batch.
+    /// Number of environments in the batch.
     pub fn batch_size(&self) -> usize {
         self.environment.batch_size()
     }
 
-    /// Lets the policy act for `steps` steps of the whole batch.
+    /// Runs the policy for `steps` steps of the whole batch.
     pub fn collect(&mut self, networks: &ActorCritic, steps: usize) -> Result<Rollout> {
         let n = self.batch_size();
         let std = networks.action_std();
         let mut rollout = Rollout::default();
         let mut normalised = vec![0.0; self.transition.observation.len()];
         for _ in 0..steps {
-            // Sample an action: mean of the actor plus noise of our own generator.
+            // Sample an action: mean of the actor plus noise from our own generator.
             let observation = &self.transition.observation;
             self.normaliser.normalise(observation, &mut normalised);
             let input = networks.observations(&normalised);
@@ -93,7 +93,7 @@ impl<'a> Collector<'a> {
             rollout.observation.extend_from_slice(&normalised);
             rollout.action.extend(action.iter().map(|&a| a as f32));
 
-            // Step, with the action that the environment can take.
+            // Clip the action to the environment's range, and step.
             action.iter_mut().for_each(|a| *a = a.clamp(-1.0, 1.0));
             self.environment.step(&action, &mut self.transition)?;
             self.env_steps += n;
@@ -121,7 +121,7 @@ impl<'a> Collector<'a> {
         Ok(rollout)
     }
 
-    /// The environment kept the shapes and gave finite numbers.
+    /// Checks that the environment kept the shapes and returned finite numbers.
     fn check(&self) -> Result<()> {
         let (n, len) = (self.batch_size(), self.environment.observation_len());
         let t = &self.transition;
@@ -133,7 +133,8 @@ impl<'a> Collector<'a> {
         }
         for i in 0..n {
             let row = i * len..(i + 1) * len;
-            // The state that a terminated episode reached is never valued: it may be anything.
+            // The state that a terminated episode reached is never evaluated, so it may hold
+            // anything.
             let reached = if t.terminated[i] {
                 &[]
             } else {

@@ -6,14 +6,14 @@
 //! L    = -mean(min(r A, clip(r, 1 - eps, 1 + eps) A))
 //! ```
 //!
-//! A sample whose ratio has left the interval on the side to which its
-//! advantage pushes has no gradient; on the other side it is pulled back.
+//! A sample whose ratio has left the interval in the direction that its advantage favours has no
+//! gradient. On the other side it is pulled back.
 
 use tch::{Kind, Tensor};
 
-/// Loss whose gradient is that of the surrogate objective; scalar.
+/// Loss with the gradient of the surrogate objective; scalar.
 ///
-/// `log_prob`, `old_log_prob` and `advantage` have one entry a sample.
+/// `log_prob`, `old_log_prob` and `advantage` have one entry per sample.
 pub fn clipped_surrogate_loss(
     log_prob: &Tensor,
     old_log_prob: &Tensor,
@@ -27,7 +27,7 @@ pub fn clipped_surrogate_loss(
         .mean(None::<Kind>)
 }
 
-/// How far a policy has moved from the one that gathered the samples.
+/// Shift of a policy relative to the one that collected the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shift {
     /// Estimate of KL(old, new): mean of `(r - 1) - log r`, which is never negative.
@@ -63,7 +63,7 @@ mod tests {
         -0.5 * ((ACTION[i] - weight * STATE[i]) / SIGMA).powi(2)
     }
 
-    /// Gradient of the loss with respect to `weight` through libtorch and by hand.
+    /// Gradient of the loss with respect to `weight`: by libtorch and by hand.
     fn gradients(weight: f64, old_weight: f64, advantage: &[f64; 4]) -> (f64, f64) {
         let w = Tensor::from(weight).set_requires_grad(true);
         let off: Tensor = (Tensor::from_slice(&ACTION) - &w * Tensor::from_slice(&STATE)) / SIGMA;
@@ -87,8 +87,8 @@ mod tests {
         (w.grad().double_value(&[]), by_hand)
     }
 
-    /// At the old policy no sample is clipped, and the gradient is the policy gradient:
-    /// with the scores 2.4, -0.9, -8 and 0.025, -(2.4 + 1.8 - 4 + 0.0375) / 4.
+    /// At the old policy no sample is clipped, and the gradient is the policy gradient: with the
+    /// scores 2.4, -0.9, -8 and 0.025 it is -(2.4 + 1.8 - 4 + 0.0375) / 4.
     #[test]
     fn at_the_old_policy_the_gradient_is_the_policy_gradient() {
         let (torch, by_hand) = gradients(0.3, 0.3, &[1.0, -2.0, 0.5, 1.5]);
@@ -96,8 +96,8 @@ mod tests {
         assert!((by_hand + 0.059375).abs() < 1e-12, "{by_hand}");
     }
 
-    /// The ratios of these samples are 1.90, 0.64, 0.01 and 0.99 (w from 0.3 to 0.7),
-    /// so every sign of the advantage meets every side of the interval.
+    /// The ratios of these samples are 1.90, 0.64, 0.01 and 0.99 (w from 0.3 to 0.7), so every sign
+    /// of the advantage is tested on every side of the interval.
     #[test]
     fn a_sample_is_clipped_only_on_the_side_it_is_pushed_to() {
         for signs in 0..16_u32 {
@@ -113,7 +113,7 @@ mod tests {
         }
     }
 
-    /// Ratios 1, 2 and 1/2: KL by hand, two of three outside 0.8 to 1.2.
+    /// Ratios 1, 2 and 1/2: KL by hand; two of three lie outside 0.8 to 1.2.
     #[test]
     fn the_shift_is_that_of_the_ratios() {
         let old = Tensor::from_slice(&[0.0, 0.0, 0.0]);

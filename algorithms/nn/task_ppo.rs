@@ -1,4 +1,4 @@
-//! Trains the explorer `task-ppo`, whose settings and play are in [`asid_learned::task_ppo`].
+//! Trains the explorer `task-ppo`; its settings and play are in [`asid_learned::task_ppo`].
 
 use asid_core::registry::{self, Settings};
 use asid_core::{Error, Problem, Result};
@@ -13,10 +13,10 @@ inventory::submit! {
     Trainer { algorithm: TaskPpo::NAME, train }
 }
 
-/// Pays for the way made towards the goal.
+/// Rewards progress towards the goal.
 struct Nearer<'a> {
     problem: &'a Problem<'a>,
-    /// Worth of the latest reading of each episode.
+    /// Goal reward of the latest reading of each episode.
     worth: Vec<f64>,
 }
 
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use crate::testing::with_problem;
 
-    /// The rewards of an episode add up to the way made towards the goal.
+    /// The rewards of an episode add up to its progress towards the goal.
     #[test]
     fn the_return_is_the_way_made() {
         with_problem("sphere-striking", |problem| {

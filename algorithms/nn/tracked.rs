@@ -1,4 +1,4 @@
-//! Exploration episodes as a batch of environments, each with what makes its observations.
+//! Exploration episodes as a batch of environments, each with its own observer.
 
 use asid_core::environment::{BatchEnvironment, Transition};
 use asid_core::{Problem, Result};
@@ -6,24 +6,24 @@ use asid_learned::EpisodeBatch;
 use asid_learned::file::ActionEntry;
 use asid_learned::play::{Observe, actions};
 
-/// What control steps are paid for; `S` makes the observations.
+/// Reward of control steps; `S` makes the observations.
 pub trait Pay<S> {
-    /// A new episode begins in environment `e` with this reading.
+    /// Called when a new episode begins in environment `e` with this reading.
     fn begin(&mut self, e: usize, sight: &S, reading: &[f64], theta: &[f64]);
 
     /// Reward of a control step that ended with this reading.
     fn reward(&mut self, e: usize, sight: &S, reading: &[f64], theta: &[f64]) -> f64;
 
-    /// All episodes have ended; `theta` is `episodes x unknowns`.
+    /// Called when all episodes have ended; `theta` is `episodes x unknowns`.
     ///
     /// # Errors
-    /// When what is learned from them fails.
+    /// When learning from the episodes fails.
     fn ended(&mut self, _sights: &mut [S], _theta: &[f64]) -> Result<()> {
         Ok(())
     }
 }
 
-/// Episodes that begin and end together.
+/// Environments whose episodes begin and end together.
 pub struct TrackedEnvironment<'a, S, P> {
     batch: EpisodeBatch<'a>,
     sights: Vec<S>,
@@ -35,8 +35,9 @@ pub struct TrackedEnvironment<'a, S, P> {
 }
 
 impl<'a, S: Observe, P: Pay<S>> TrackedEnvironment<'a, S, P> {
-    /// One environment for each sight, with observations of `observation_len` entries; `stream`
-    /// names the chance of truths, starts and noise.
+    /// One environment for each sight, with observations of `observation_len` entries.
+    ///
+    /// `stream` names the random stream of truths, starts and noise.
     ///
     /// # Errors
     /// As [`EpisodeBatch::new`].
@@ -110,10 +111,11 @@ impl<S: Observe, P: Pay<S>> BatchEnvironment for TrackedEnvironment<'_, S, P> {
             let theta = self.theta(e).to_vec();
             let reading = self.batch.reading(e);
             let reward = self.pay.reward(e, &self.sights[e], reading, &theta);
-            // An episode that diverged is worth nothing more.
+            // A diverged episode earns nothing more.
             transition.reward[e] = if reward.is_finite() { reward } else { 0.0 };
         }
-        // The horizon is part of the task and the time is observed: its end is an end, not a cut.
+        // The horizon is part of the task and the time is observed: reaching it terminates the
+        // episode and does not truncate it.
         let over = self.batch.steps() == self.horizon;
         transition.terminated.fill(over);
         transition.truncated.fill(false);
@@ -128,7 +130,7 @@ impl<S: Observe, P: Pay<S>> BatchEnvironment for TrackedEnvironment<'_, S, P> {
     }
 }
 
-/// Pays nothing: for learners that make their own reward of what they see.
+/// Zero reward, for learners that compute their own from the observations.
 pub struct Nothing;
 
 impl<S> Pay<S> for Nothing {

@@ -1,4 +1,4 @@
-//! What the trainings of explorers share: PPO on an environment, with its curves.
+//! Common part of the explorers' trainings: PPO on an environment, with its curves.
 
 use std::ops::ControlFlow;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -23,7 +23,7 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// The training, with the policy among its tensors and its return among its figures.
+    /// Converts to a training, with the policy among its tensors and its return among its figures.
     pub fn training(self, observation: Vec<ObservationEntry>) -> Training {
         let mut tensors = Tensors::new();
         self.policy.to_tensors(POLICY, &mut tensors);
@@ -44,7 +44,7 @@ pub fn wall_time() -> f64 {
     since.map_or(0.0, |d| d.as_secs_f64())
 }
 
-/// The point of a curve under CleanRL's names; what is not a number is left out.
+/// A point of the learning curve under CleanRL's names; values that are not finite are left out.
 pub fn scalars(p: &PpoProgress, started: Instant) -> Scalars {
     let seconds = started.elapsed().as_secs_f64().max(1e-9);
     let values = [
@@ -72,7 +72,7 @@ pub fn scalars(p: &PpoProgress, started: Instant) -> Scalars {
     }
 }
 
-/// PPO on an environment, told as progress of the problem.
+/// Runs PPO on an environment and reports its progress to the problem.
 ///
 /// # Errors
 /// Those of the environment and of the learner.

@@ -1,4 +1,4 @@
-//! How much do the episodes of each explorer tell? A table of the expected posterior
+//! Compares how much the episodes of each explorer reveal: a table of the expected posterior
 //! standard deviation of the first unknown.
 //!
 //! ```sh
@@ -6,15 +6,17 @@
 //!     rod-balancing mujoco 20 random fisher-cem fisher-ppo fisher-ppo/seed=1
 //! ```
 //!
-//! All explorers meet the same start poses and truths, drawn from their ranges, in the
-//! engine that they simulate with, and see readings with the trackers' noise. What an
-//! episode tells is computed at the truth and the true start, with the settings that
-//! the reports use, whatever the explorer was paid for. An explorer's settings follow
-//! its name: `fisher-ppo/ppo.total_steps=50000/fisher.objective=a-optimal`; `seed` is
-//! that of its own chance. Ratios are to the first explorer of the line. Standard error
-//! gets the return over training and the value of every episode.
+//! All explorers get the same start poses and truths, drawn from their ranges, in the engine that
+//! they simulate with. They see readings with the trackers' noise. The expected standard deviation
+//! is computed at the truth and the true start, with the settings that the reports use, whatever
+//! the explorer's own reward.
+//!
+//! An explorer's settings follow its name:
+//! `fisher-ppo/ppo.total_steps=50000/fisher.objective=a-optimal`; `seed` is that of its own random
+//! numbers. Ratios are relative to the first explorer of the command line. Standard error shows the
+//! return over training and the value of every episode.
 
-// A table on standard output is what this program is for.
+// This program exists to print a table on standard output.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
@@ -28,7 +30,7 @@ use asid::pipeline::episode_information;
 use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
 
-/// Seed of the episodes, whatever the explorers' own.
+/// Seed of the episodes, independent of the explorers' own seeds.
 const EPISODE_SEED: u64 = 2;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
@@ -69,7 +71,7 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// Progress as lines on standard error.
+/// Prints progress as lines on standard error.
 struct Notes;
 
 impl Progress for Notes {
@@ -81,7 +83,7 @@ impl Progress for Notes {
     fn end(&self) {}
 }
 
-/// What all explorers are measured on.
+/// The common benchmark of all explorers.
 struct Bench<'a> {
     task: &'a dyn Task,
     model: &'a dyn Model,
@@ -90,7 +92,7 @@ struct Bench<'a> {
     counter: AtomicU64,
 }
 
-/// What one explorer did.
+/// Results of one explorer.
 struct Row {
     /// Expected standard deviation at the end of each episode.
     stds: Vec<f64>,
@@ -98,7 +100,7 @@ struct Row {
     contact: f64,
     /// Training time, s.
     set_up_s: f64,
-    /// Time of an episode, planning included, s.
+    /// Time per episode, including planning, s.
     episode_s: f64,
 }
 
@@ -128,7 +130,7 @@ impl Bench<'_> {
         let clock = Instant::now();
         let mut explored = explorer.explore(&problem, None)?;
         let set_up_s = clock.elapsed().as_secs_f64();
-        // A policy without a learning curve searches when its episode begins, for that start.
+        // A policy without a learning curve plans when its episode begins, for that start.
         let searches = explored.curve.is_empty();
         let clock = Instant::now();
         let streams = Streams::new(EPISODE_SEED);
@@ -199,7 +201,7 @@ fn parse(explorer: &str) -> Outcome<(&str, Settings, u64)> {
     Ok((name, settings, seed))
 }
 
-/// Puts the entries of `from` over those of `into`.
+/// Merges the entries of `from` over those of `into`.
 fn merge(into: &mut Settings, from: Settings) {
     for (key, value) in from {
         match (into.get_mut(&key), value) {

@@ -14,21 +14,21 @@ use crate::ensemble::{Ensemble, Transitions, divergence};
 /// Writes the actions of the whole batch for its observations.
 type Act<'a> = &'a mut dyn FnMut(&[f64], &mut [f64]) -> Result<()>;
 
-/// All transitions with the states that imagination begins at.
+/// All transitions, and the states from which imagined episodes start.
 pub struct Experience {
     shape: Shape,
-    /// What the ensemble learns from.
+    /// Training data of the ensemble.
     pub transitions: Transitions,
     /// First states of episodes, `n x state`.
     starts: Vec<f32>,
-    /// Lowest and highest value of each place.
+    /// Lowest and highest value of each place so far.
     seen: Vec<[f32; 2]>,
     /// Control steps played so far.
     pub steps: usize,
 }
 
 impl Experience {
-    /// Nothing played yet.
+    /// Empty experience.
     pub fn new(shape: Shape) -> Self {
         Self {
             seen: vec![[f32::INFINITY, f32::NEG_INFINITY]; shape.places],
@@ -39,7 +39,7 @@ impl Experience {
         }
     }
 
-    /// Plays whole episodes, at least `episodes`, with actions by `act`.
+    /// Plays at least `episodes` whole episodes, with actions from `act`.
     pub fn play(
         &mut self,
         world: &mut dyn BatchEnvironment,
@@ -84,11 +84,11 @@ impl Experience {
     }
 }
 
-/// Episodes that the ensemble makes up.
+/// Environment of episodes that the ensemble imagines.
 pub struct Imagination<'a> {
     ensemble: &'a Ensemble,
     experience: &'a Experience,
-    /// States now, `size x state`.
+    /// Present states, `size x state`.
     state: Vec<f32>,
     size: usize,
     actions: usize,
@@ -97,7 +97,8 @@ pub struct Imagination<'a> {
 }
 
 impl<'a> Imagination<'a> {
-    /// `size` episodes at a time, of `actions` entries an action, that begin where episodes of the world did.
+    /// `size` simultaneous episodes with `actions` entries per action; they start at start states
+    /// of the world.
     pub fn new(
         ensemble: &'a Ensemble,
         experience: &'a Experience,
@@ -129,7 +130,7 @@ impl<'a> Imagination<'a> {
     }
 }
 
-/// How far past what was seen imagination may go, as a share of the seen range.
+/// How far imagined places may leave the range seen so far, as a share of that range.
 const BEYOND: f32 = 0.25;
 
 impl BatchEnvironment for Imagination<'_> {
@@ -170,7 +171,7 @@ impl BatchEnvironment for Imagination<'_> {
             .ok_or_else(unfitted)?;
         let utility: Vec<f64> = to_vec(&divergence(&prediction.first(shape.paid)));
         transition.reward.copy_from_slice(&utility);
-        // The next state is a draw from a member that is drawn, as of the mixture.
+        // The next state is drawn from a randomly chosen member, that is, from the mixture.
         let models = prediction.mean.size()[0];
         let member: Vec<i64> = (0..self.size)
             .map(|_| self.rng.random_range(0..models))
