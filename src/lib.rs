@@ -1,9 +1,7 @@
-//! Active exploration for system identification, and diagnosis of the
-//! sim-to-real gap.
+//! Active exploration for system identification, and diagnosis of the sim-to-real gap.
 //!
-//! This crate gathers the others for authors of plugins, and holds the `asid`
-//! command line: a program that links a plugin and calls [`cli::main`] has the
-//! whole of it.
+//! This crate gathers the others for authors of plugins and holds the `asid` command line. A
+//! program that links a plugin and calls [`cli::main`] has the whole of it.
 
 pub use asid_algorithms as algorithms;
 pub use asid_core as core;

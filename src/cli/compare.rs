@@ -1,7 +1,7 @@
-//! `asid compare`: methods head to head, over tasks, conditions, worlds, engines and seeds.
+//! `asid compare`: compares methods over tasks, conditions, worlds, engines and seeds.
 //!
-//! What a comparison is, what is kept of it and what is said of it is the crate
-//! `asid-comparison`; here its cells are run.
+//! The crate `asid-comparison` defines comparisons, their files and their tables; this module runs
+//! their cells.
 
 use std::path::{Path, PathBuf};
 
@@ -35,14 +35,16 @@ mod worker;
 pub struct Arguments {
     /// Compare on these tasks [default: all]
     tasks: Vec<String>,
-    /// Method: asid, asid-estimator, maxmi, max, random, dr, oracle (which is told the truth), or any
-    /// other as NAME=explorer+identifier+solver (repeatable) [default: asid, random, dr]
+    /// Method: asid, asid-estimator, maxmi, max, random, dr, oracle (which is told the truth), or
+    /// any other as NAME=explorer+identifier+solver (repeatable) [default: asid, random, dr]
     #[arg(long, value_name = "M")]
     method: Vec<String>,
-    /// Condition of the task, such as left; `prior` draws truths from the whole prior (repeatable) [default: all of the task's own; prior where it has none]
+    /// Condition of the task, such as left; `prior` draws truths from the whole prior (repeatable)
+    /// [default: all of the task's own; prior where it has none]
     #[arg(long, value_name = "NAME")]
     condition: Vec<String>,
-    /// Play in this kind of real world, such as matched, crossed or perturbed (repeatable) [default: matched]
+    /// Play in this kind of real world, such as matched, crossed or perturbed (repeatable)
+    /// [default: matched]
     #[arg(long, value_name = "KIND")]
     world: Vec<String>,
     /// Simulate with this engine: see `asid list` (repeatable)
@@ -80,7 +82,8 @@ pub struct Arguments {
     /// Run only a share of the cells, such as 2/4; shares may write into one folder, or be merged
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Submit the comparison as a job array of this scheduler, into one folder; the only one is slurm
+    /// Submit the comparison as a job array of this scheduler, into one folder; the only one is
+    /// slurm
     #[arg(long, value_name = "SCHEDULER", value_parser = ["slurm"])]
     submit: Option<String>,
     /// Split the job array into this many tasks [default: one a run, at most 32]
@@ -103,13 +106,15 @@ pub struct Arguments {
     /// Allow rows of different commits in one table; each row is of one commit and names it
     #[arg(long, requires = "merge")]
     across_commits: bool,
-    /// Play this many runs side by side, one a thread; results do not depend on it [default: one a core]
+    /// Play this many runs side by side, one a thread; results do not depend on it [default: one a
+    /// core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     threads: Option<usize>,
     /// Take settings from a file, such as a comparison's or a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Set the difficulty of all tasks: default, or published; a single value by --set difficulty.NAME=VALUE
+    /// Set the difficulty of all tasks: default, or published; a single value by --set
+    /// difficulty.NAME=VALUE
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// Set a value, such as solver.iterations=10, for every method that has it (repeatable)
@@ -136,13 +141,15 @@ pub struct Arguments {
 /// The real world of every run, but for its kind.
 #[derive(clap::Args, Clone)]
 struct Real {
-    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06 [default: that of the condition, else drawn]
+    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06
+    /// [default: that of the condition, else drawn]
     #[arg(long, value_name = "NAME=VALUE")]
     truth: Vec<String>,
     /// Play the real world with this engine [default: the simulator's]
     #[arg(long, value_name = "NAME")]
     real_backend: Option<String>,
-    /// Simulate the real world with this model: MJCF, or a refined.toml of a diagnosis [default: the task's scene]
+    /// Simulate the real world with this model: MJCF, or a refined.toml of a diagnosis [default:
+    /// the task's scene]
     #[arg(long, value_name = "FILE")]
     real_model: Option<PathBuf>,
     /// Add an effect to the real world that the simulator lacks (repeatable)
@@ -160,7 +167,7 @@ struct Parts {
 }
 
 impl Arguments {
-    /// What a figure is drawn with.
+    /// The request of a figure.
     fn figure_request(&self) -> figure::Request<'_> {
         figure::Request {
             common: Common {
@@ -183,8 +190,8 @@ impl Arguments {
         }
     }
 
-    /// The comparison on a task that these arguments ask for, under one more setting and in a folder of
-    /// its own.
+    /// The comparison on a task that these arguments request, under one more setting and in a
+    /// folder of its own.
     fn compare_at(&self, task: &str, setting: &str, folder: &Path) -> Result<ComparisonResult> {
         let mut own = Self {
             tasks: vec![task.to_owned()],
@@ -207,7 +214,7 @@ impl Arguments {
     }
 }
 
-/// Runs the comparison, or what is missing of it, and writes its folder.
+/// Runs the comparison, or its missing cells, and writes its folder.
 pub fn compare(arguments: &Arguments) -> Result<()> {
     if let Some(name) = &arguments.figure {
         arguments.check_figure(name)?;

@@ -1,4 +1,5 @@
-//! `asid config`: every setting of a task, or of what is done with a study or a model, with its value and meaning, as a file for `--config`.
+//! `asid config`: every setting with its value and meaning, as a file for `--config`. The settings
+//! are those of a task, or of a command on a study or a model.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use super::options::{Algorithms, Common, Worlds};
 use super::settings::{Config, ParameterConfig, Stage, difficulty, wrong};
 use super::{diagnose, machine};
 
-/// Columns of a comment.
+/// Width of a comment, in columns.
 const WIDTH: usize = 100;
 
 /// Arguments of `config`.
@@ -102,7 +103,8 @@ fn of_study(study: &Path, command: Option<OfStudy>, common: &Common) -> Result<S
     Ok(page)
 }
 
-/// The settings of an exploration of a machine: name of the command, an example, the settings and what they mean.
+/// The settings for exploring a machine: the command's name, an example, the settings and their
+/// meanings.
 fn of_motion(
     machine: &Path,
     common: &Common,
@@ -134,7 +136,7 @@ fn of_task(task: Box<dyn Task>, arguments: &Arguments, common: &Common) -> Resul
     Ok(page)
 }
 
-/// What every setting means, by its whole key.
+/// The meaning of every setting, by its full key.
 fn meanings_of(config: &Config, task: &dyn Task) -> Result<Meanings> {
     let mut all = meanings::<Config>();
     let mut add = |section: &str, found: Meanings| {
@@ -168,7 +170,7 @@ fn meanings_of(config: &Config, task: &dyn Task) -> Result<Meanings> {
     Ok(all)
 }
 
-/// What the settings of an algorithm mean, its name among them.
+/// The meanings of an algorithm's settings, including its name.
 fn of<T: ?Sized + 'static>(name: &str) -> Result<Meanings>
 where
     AlgorithmEntry<T>: Entry,
@@ -198,7 +200,7 @@ fn write(table: &toml::Table, path: &[&str], meanings: &Meanings, page: &mut Str
     }
 }
 
-/// A key as TOML writes it.
+/// A key in TOML syntax.
 fn quoted(key: &str) -> String {
     let line = toml::Table::from_iter([(key.to_owned(), toml::Value::Boolean(true))]).to_string();
     line.trim_end().trim_end_matches(" = true").to_owned()
@@ -230,7 +232,7 @@ mod tests {
 
     use super::*;
 
-    /// Whole keys of a table's values and inner tables.
+    /// Full keys of a table's values and inner tables.
     fn keys(table: &toml::Table, prefix: &str) -> Vec<String> {
         let of = |(key, value): (&String, &toml::Value)| {
             let own = format!("{prefix}{key}");

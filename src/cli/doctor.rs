@@ -1,4 +1,4 @@
-//! `asid doctor`: native libraries looked for, found, missing, and how to get them.
+//! `asid doctor`: which native libraries were looked for, found or missing, and how to get them.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -40,7 +40,7 @@ const LIBRARIES: [Library; 2] = [
     },
 ];
 
-/// Prints what was looked for and found.
+/// Prints the libraries that were looked for and found.
 pub fn doctor(_arguments: &Arguments, refused: &[Refused]) -> Result<()> {
     let mut out = std::io::stdout().lock();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -81,7 +81,7 @@ pub fn doctor(_arguments: &Arguments, refused: &[Refused]) -> Result<()> {
                 library.what_for,
                 path.display()
             )?,
-            // A program that runs has found what it is linked with, wherever that is.
+            // A running program has found the libraries that it is linked with, wherever they are.
             None if library.built_in => writeln!(
                 out,
                 "ok       {} for {} ({built})",

@@ -1,8 +1,8 @@
 //! `asid explore`: the exploration policy and its commands, for a real machine.
 //!
-//! The policy is played once in the simulator at the middle of the prior. An
-//! open-loop policy can be played from `commands.csv` as it stands; one that reacts
-//! to its readings is in `policy.json`, and the commands are what it would do there.
+//! The policy is played once in the simulator, at the middle of the prior. An open-loop policy can
+//! be played from `commands.csv` as it stands. A policy that reacts to its readings is in
+//! `policy.json`; the commands are those of the simulated episode.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -176,7 +176,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
     })
 }
 
-/// What each unknown is expected to be known to after an episode, in words.
+/// Text on the expected deviation of each unknown after an episode.
 fn expected(session: &Session, information: &EpisodeInformation) -> String {
     let deviations = information.expected_std.last().into_iter().flatten();
     let each = session.parameters.iter().zip(deviations);
@@ -186,7 +186,8 @@ fn expected(session: &Session, information: &EpisodeInformation) -> String {
     each.join(", ")
 }
 
-/// The files of the folder beside result and report, with what they are; the last where a real world played.
+/// The files of the folder beside result and report, with descriptions; the last is written only
+/// where a real world played.
 fn files(is_real: bool) -> Vec<(&'static str, &'static str)> {
     let mut files = vec![
         (
@@ -203,7 +204,7 @@ fn files(is_real: bool) -> Vec<(&'static str, &'static str)> {
     files
 }
 
-/// The task; of any machine the motion is designed here, and there is none.
+/// The task; `None` for a machine, whose motion is designed here.
 fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
     let common = &arguments.common;
     let wrong = |key: &str, message: &str| asid_core::Error::Config {
@@ -238,7 +239,7 @@ fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
     Ok(None)
 }
 
-/// The simulator at these values, whose trackers are perfect.
+/// The simulator at these values, with perfect trackers.
 fn nominal_world<'a>(session: &'a Session, theta: &[f64]) -> Result<SimulatedWorld<'a>> {
     let signals: Vec<Signal> = session
         .signals

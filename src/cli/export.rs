@@ -76,7 +76,7 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Writes a file that must not exist.
+/// Writes a file that must not exist yet.
 pub fn create(path: &Path, text: &str) -> Result<()> {
     let failed = |e: std::io::Error| Error::File {
         path: path.to_owned(),

@@ -1,4 +1,5 @@
-//! `asid export-log`: the logs of a study or of a result as MCAP, for Foxglove, Rerun and PlotJuggler.
+//! `asid export-log`: the logs of a study or of a result as MCAP, for Foxglove, Rerun and
+//! PlotJuggler.
 
 use std::path::PathBuf;
 
@@ -169,7 +170,7 @@ mod with_mcap {
         }
     }
 
-    /// Name of a log's file: of `../sub/train_0.csv` its stem, of `set#3` `set_3`.
+    /// Name of a log's file: the stem of `../sub/train_0.csv`, `set_3` for `set#3`.
     fn short(name: &str) -> String {
         let file = Path::new(name).file_name();
         let file = file.map_or_else(|| name.into(), |f| f.to_string_lossy());
@@ -179,7 +180,7 @@ mod with_mcap {
             .replace('#', "_")
     }
 
-    /// Numbers names that occur twice.
+    /// Numbers names that occur more than once.
     fn tell_apart(logs: &mut [RawLog]) {
         let names: Vec<String> = logs.iter().map(|l| l.name.clone()).collect();
         for (i, log) in logs.iter_mut().enumerate() {

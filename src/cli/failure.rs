@@ -5,15 +5,15 @@ use std::panic::AssertUnwindSafe;
 use std::process::ExitCode;
 use std::sync::Mutex;
 
-/// Exit status of work that failed.
+/// Exit status when the work failed.
 const FAILED: u8 = 1;
-/// Exit status of a call that was wrong.
+/// Exit status when the call was wrong.
 const WRONG_CALL: u8 = 2;
 
-/// What the latest panic said, and where.
+/// Message and place of the latest panic.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// A problem with the command line itself; help and version are no problem.
+/// Reports a problem with the command line itself; a request for help or version is no problem.
 pub fn usage(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{
         DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
@@ -34,7 +34,7 @@ pub fn usage(error: &clap::Error) -> ExitCode {
     }
 }
 
-/// The message of the parser without its heading and its reminder of the usage.
+/// The parser's message without its heading and its reminder of the usage.
 fn usage_line(text: &str) -> String {
     let text = text.strip_prefix("error: ").unwrap_or(text);
     let end = ["\n\nUsage:", "\n\nFor more information"]
@@ -50,9 +50,9 @@ fn usage_line(text: &str) -> String {
     format!("{}; see --help", paragraphs.join("; "))
 }
 
-/// Writes the error and tells whether the call or the work was wrong.
+/// Writes the error and returns the exit status: wrong call or failed work.
 pub fn report(error: &anyhow::Error) -> ExitCode {
-    // Whoever reads standard output has seen enough, as `head` has.
+    // The reader of standard output closed it early, as `head` does: that is no failure.
     let closed = |e: &std::io::Error| e.kind() == std::io::ErrorKind::BrokenPipe;
     if error.downcast_ref::<std::io::Error>().is_some_and(closed) {
         return ExitCode::SUCCESS;
@@ -64,20 +64,20 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
     }
 }
 
-/// A remark that stops nothing.
+/// Prints a warning, which stops nothing.
 pub fn warn(text: &str) {
     tell(&format!("warning: {}", one_line(text)));
 }
 
-/// A line on standard error that is no warning.
+/// Prints a line on standard error that is no warning.
 pub fn note(text: &str) {
     tell(&one_line(text));
 }
 
-/// Runs `work`; a panic in it, which is a defect of this program or of a plugin, ends as one line.
+/// Runs `work`; a panic in it, a defect of this program or of a plugin, becomes a one-line error.
 ///
-/// Engines catch panics of their own and report them as a simulation's status, so
-/// nothing is written until one gets here. `RUST_BACKTRACE` brings the usual text back.
+/// Engines catch their own panics and report them as a simulation's status, so a message is written
+/// only for a panic that reaches this function. `RUST_BACKTRACE` restores the usual text.
 pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
     if std::env::var_os("RUST_BACKTRACE").is_none() {
         std::panic::set_hook(Box::new(|info| {
@@ -97,8 +97,8 @@ pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
     })
 }
 
-/// What to say of a panic that was caught: what the plugin is to blame for, else that this
-/// program is.
+/// The message for a caught panic: the plugin's fault if it is to blame, else a defect of this
+/// program.
 pub fn of_panic(payload: &(dyn std::any::Any + Send)) -> String {
     if let Some(text) = payload.downcast_ref::<String>()
         && asid_core::error::blames_a_plugin(text)
@@ -113,7 +113,8 @@ pub fn of_panic(payload: &(dyn std::any::Any + Send)) -> String {
     format!("internal error: {said}; please report it with the command line")
 }
 
-/// A text as one line. Names come from files that others wrote: characters that would steer the terminal are spelt out.
+/// A text as one line. Names come from files that others wrote, so control characters, which would
+/// steer the terminal, are escaped.
 fn one_line(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut shown = String::with_capacity(line.len());
@@ -145,7 +146,8 @@ mod tests {
         );
     }
 
-    /// Symptom: a log with a column named by an escape sequence changed the colour of the terminal that told of it.
+    /// Symptom: the name of a log's column held an escape sequence. The message about the log then
+    /// changed the colour of the terminal.
     #[test]
     fn names_from_files_do_not_steer_the_terminal() {
         assert_eq!(

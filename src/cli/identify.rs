@@ -23,11 +23,11 @@ use super::session::Session;
 use super::settings::{Stage, wrong};
 use super::{failure, interrupt, machine, stage, trace, train};
 
-/// A residual above this many standard deviations of the noise is more than chance and
-/// a noise that was guessed a little low.
+/// Largest residual that chance and a slightly underestimated noise explain, in standard deviations
+/// of the noise.
 pub const UNEXPLAINED: f64 = 1.5;
 
-/// Episodes this many times longer than the task's are taken for times in another unit.
+/// Longest episode relative to the task's; a longer one probably has times in another unit.
 const LONGEST: f64 = 100.0;
 
 /// Arguments of `identify`.
@@ -46,7 +46,8 @@ and the gap is measured on those held out. The results folder then holds refined
 pub struct Arguments {
     /// The task (see `asid list`), or a study: a folder or a TOML file
     task: String,
-    /// Fit to these logs of real episodes, all together (CSV; Parquet in a build with the feature parquet)
+    /// Fit to these logs of real episodes, all together (CSV; Parquet in a build with the feature
+    /// parquet)
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
     /// Trains the identifier on episodes of --explorer, saves it for the setting `network`, and
@@ -193,7 +194,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Refuses what a study does not take.
+/// Refuses options that do not apply to a study.
 fn refuse_of_a_study(arguments: &Arguments) -> Result<()> {
     let algorithms = [&arguments.explorer, &arguments.identifier];
     let files = [&arguments.train, &arguments.policy];
@@ -211,7 +212,7 @@ fn refuse_of_a_study(arguments: &Arguments) -> Result<()> {
     ))
 }
 
-/// What was found, line by line.
+/// The identified values, line by line.
 fn lines(found: &Identified, articulation: Option<&Articulation>) -> Vec<String> {
     let marginals = found.posterior.marginals.iter();
     let mut lines: Vec<String> = marginals.map(parameter_line).collect();
@@ -223,7 +224,7 @@ fn lines(found: &Identified, articulation: Option<&Articulation>) -> Vec<String>
     lines
 }
 
-/// Names of the logs' copies in the folder, of the same format as the logs.
+/// Names of the logs' copies in the folder, in the format of the logs.
 fn copies(logs: &[PathBuf]) -> Vec<String> {
     let ending = |path: &PathBuf| match path.extension() {
         Some(e) if e.eq_ignore_ascii_case("parquet") => "parquet",
@@ -246,7 +247,7 @@ fn unexplained(residual: f64) -> String {
     )
 }
 
-/// Reads a log and checks that it can be identified from.
+/// Reads a log and checks that it can be used for identification.
 fn read(session: &Session, path: &Path) -> Result<Episode> {
     let layout = session.model.layout();
     let episode = asid_logs::episode::read(path, layout)?;

@@ -1,4 +1,4 @@
-//! `asid import`: logs of another stack as a study of a model.
+//! `asid import`: turns logs of another stack into a study of a model.
 
 mod files;
 mod opened;
@@ -47,10 +47,12 @@ pub struct Arguments {
     /// Read this topic only (repeatable) [default: all that hold numbers]
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
-    /// Read a sensor or command from this column, such as ctrl.elbow=/arm/target.data.1 (repeatable)
+    /// Read a sensor or command from this column, such as ctrl.elbow=/arm/target.data.1
+    /// (repeatable)
     #[arg(long, value_name = "NAME=COLUMN")]
     map: Vec<String>,
-    /// Write the episodes as CSV files of the model's own names and units, in place of references to the logs
+    /// Write the episodes as CSV files of the model's own names and units, in place of references
+    /// to the logs
     #[arg(long)]
     copy: bool,
     /// The engine that tries the mapping: see `asid list`
@@ -66,17 +68,17 @@ pub struct Arguments {
 
 /// A log that is imported.
 pub struct Imported {
-    /// Where it is: the path, with `#` and the number of an episode in a dataset.
+    /// Its path, with `#` and the episode's number in a dataset.
     pub path: PathBuf,
     /// Whether it is held out.
     pub test: bool,
-    /// As it was recorded.
+    /// The log as recorded.
     pub raw: RawLog,
-    /// As the model has it.
+    /// The log as an episode of the model.
     pub episode: Episode,
 }
 
-/// Imports.
+/// Runs the import.
 pub fn import(arguments: &Arguments) -> Result<()> {
     let subject = Subject::open(&arguments.model, arguments.backend.as_deref())?;
     if subject.study.is_some() {
@@ -163,7 +165,7 @@ fn given(map: &[String]) -> Result<Vec<(String, String)>> {
     map.iter().map(one).collect()
 }
 
-/// Refuses a mapping that no diagnosis can start from; `log` is what it was sought in.
+/// Refuses a mapping from which no diagnosis can start; `log` is where it was sought.
 fn complete(proposal: &Proposal, log: &RawLog) -> Result<()> {
     let refuse = |message: String| {
         Err(Error::Config {
@@ -194,7 +196,7 @@ fn complete(proposal: &Proposal, log: &RawLog) -> Result<()> {
     Ok(())
 }
 
-/// The columns that are left for what is missing, in words.
+/// Text on the unused columns that may hold what is missing.
 fn left(proposal: &Proposal, log: &RawLog) -> String {
     let unused = match table::listed(&proposal.unused) {
         None => "nothing is left in the log".to_owned(),
@@ -222,7 +224,7 @@ fn episodes(raw: Vec<Opened>, subject: &Subject, proposal: &Proposal) -> Result<
     raw.into_iter().map(one).collect()
 }
 
-/// A log as an episode of a model: what a study reads of it.
+/// A log as an episode of a model, as a study would read it.
 fn episode(
     path: &Path,
     raw: &RawLog,

@@ -1,4 +1,5 @@
-//! Ctrl-C in commands whose result is written whole at their end, or not at all: one line says what was stopped and what was written.
+//! Ctrl-C in commands whose result is written whole at the end, or not at all. One line says what
+//! was stopped and what was written.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -12,19 +13,21 @@ use signal_hook::low_level;
 
 use super::failure;
 
-/// Exit status of a process that SIGINT ended, as shells count it.
+/// Exit status after SIGINT, as shells count it.
 pub const INTERRUPTED: i32 = 130;
 
-/// Whether a result was written; held while one is.
+/// Whether a result was written; the lock is held during writing.
 static WRITTEN: Mutex<bool> = Mutex::new(false);
 
-/// Whether a result was written, to be set where one is. An interruption waits while this is held, so that it finds a result whole or not
-/// begun.
+/// Locks the flag that says whether a result was written; the writer sets it.
+///
+/// An interruption waits while the lock is held, so that it finds a result whole or not begun.
 pub fn writing() -> MutexGuard<'static, bool> {
     WRITTEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// From here on Ctrl-C ends the process with a line that says that `what`, such as `the run of TASK`, was stopped.
+/// From now on Ctrl-C ends the process with a line that names what was stopped: `what`, such as
+/// `the run of TASK`.
 pub fn watch(what: &str) -> Result<()> {
     let failed = |e| Error::Failed(format!("cannot watch for signals: {e}"));
     let mut signals = Signals::new([SIGINT]).map_err(failed)?;
@@ -34,14 +37,14 @@ pub fn watch(what: &str) -> Result<()> {
             let written = writing();
             end_line();
             failure::note(&told(&what, begun.elapsed().as_secs_f64(), *written));
-            // Threads of engines may be at work: nothing is torn down beneath them.
+            // Threads of engines may still run, so exit without tearing anything down.
             low_level::exit(INTERRUPTED);
         }
     });
     Ok(())
 }
 
-/// What is said of an interruption.
+/// Text on an interruption.
 fn told(what: &str, seconds: f64, written: bool) -> String {
     let left = if written {
         "its result is written"
@@ -51,7 +54,7 @@ fn told(what: &str, seconds: f64, written: bool) -> String {
     format!("Ctrl-C: {what} was stopped after {seconds:.0} s; {left}")
 }
 
-/// Leaves the line of a progress bar on a terminal.
+/// Moves past a progress bar on a terminal.
 fn end_line() {
     let mut stderr = std::io::stderr();
     if stderr.is_terminal() {

@@ -1,4 +1,4 @@
-//! `asid list`: what there is, what is missing, and why.
+//! `asid list`: what is available, what is missing, and why.
 
 use std::io::Write as _;
 
@@ -20,7 +20,8 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What this build may lack: kind, name, the feature that brings it. What is not built in cannot say so itself.
+/// What this build may lack: kind, name, and the feature that adds it. What is not built in cannot
+/// register itself.
 const OPTIONAL: [(&str, &str, &str); 3] = [
     ("backend", "mujoco", "mujoco"),
     ("backend", "rapier", "rapier"),
@@ -41,7 +42,7 @@ const OWN: [&str; 7] = [
     "asid-tasks",
 ];
 
-/// Says how to get something that this build lacks.
+/// The error that says how to get something that this build lacks.
 pub fn missing(kind: &str, name: &str) -> Option<Error> {
     OPTIONAL
         .iter()
@@ -81,7 +82,7 @@ fn origin(origin: Origin) -> String {
     }
 }
 
-/// One line on an entry; where its own name was taken it says so.
+/// A one-line description of an entry; if its own name was taken, the line says so.
 fn about<E: Entry>(entry: &E) -> String {
     match entry.name().split_once("@plugin") {
         Some((own, _)) => format!("{} (its name `{own}` is taken)", entry.about()),
@@ -89,7 +90,7 @@ fn about<E: Entry>(entry: &E) -> String {
     }
 }
 
-/// What ships trained of something that learns, and what its training needs.
+/// Text on what is shipped trained for a learned algorithm, and what its training needs.
 fn trained(kind: &str, name: &str) -> String {
     use asid_learned::{estimator, learning, shipped};
     let (files, can_train): (Vec<String>, bool) = match (kind, name) {

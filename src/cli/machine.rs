@@ -1,4 +1,4 @@
-//! Commands on any machine: a study, or a model file, in the place of a task.
+//! Commands on any machine: a study or a model file in place of a task.
 
 pub mod explore;
 pub mod export;
@@ -16,17 +16,17 @@ use asid_core::registry::{TaskEntry, find};
 
 pub use subject::{Subject, is_study};
 
-/// The path that an argument names, where it is no registered task.
+/// The path that an argument names; `None` for a registered task.
 ///
 /// # Errors
-/// When it is neither: the message is that of an unknown task, with names that come close.
+/// When it is neither; the message is that of an unknown task, with similar names.
 pub fn path_of(argument: &str) -> Result<Option<&Path>> {
     let unknown = match find::<TaskEntry>(argument) {
         Ok(_) => return Ok(None),
         Err(unknown) => unknown,
     };
     let path = Path::new(argument);
-    // What looks like a path is one, so that a file that is missing is told as such.
+    // Treat what looks like a path as one, so that a missing file is reported as such.
     let looks = argument.contains(['/', '\\']) || path.extension().is_some();
     if looks || path.exists() {
         return Ok(Some(path));

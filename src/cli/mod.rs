@@ -46,8 +46,9 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
-/// Design an informative motion of a robot, estimate unknown physical parameters from one episode of it, and
-/// solve the task in the fitted simulator; find what a model lacks beside the logs of a real machine.
+/// Design an informative motion of a robot, estimate unknown physical parameters from one episode
+/// of it, and solve the task in the fitted simulator; find what a model lacks beside the logs of a
+/// real machine.
 #[derive(Parser)]
 #[command(name = "asid", version, about, arg_required_else_help = true)]
 struct Cli {
@@ -79,15 +80,18 @@ enum Command {
     Compare(compare::Arguments),
     /// Check engines against theory and against the contract
     Conformance(conformance::Arguments),
-    /// Find where model and logs disagree, which effect causes it, and how far the gap shrinks with it
+    /// Find where model and logs disagree, which effect causes it, and how far the gap shrinks with
+    /// it
     Diagnose(diagnose::Arguments),
     /// Score diagnoses of cases whose effect is withheld, or make such cases
     Withheld(withheld::Arguments),
-    /// Print every setting of a task or of a diagnosis with its value and meaning, as a file for --config
+    /// Print every setting of a task or of a diagnosis with its value and meaning, as a file for
+    /// --config
     Config(config::Arguments),
     /// Write a task's scene, or a refined model, as plain MJCF
     Export(export::Arguments),
-    /// Make a study of a model and logs of another stack: CSV of any names, ROS 2 (MCAP, bags), LeRobot
+    /// Make a study of a model and logs of another stack: CSV of any names, ROS 2 (MCAP, bags),
+    /// LeRobot
     Import(import::Arguments),
     /// Write logs as MCAP, for Foxglove and Rerun
     ExportLog(export_log::Arguments),
@@ -98,7 +102,7 @@ enum Command {
 }
 
 impl Command {
-    /// The configuration that it is given.
+    /// The configuration file of the subcommand.
     fn config(&self) -> Option<&Path> {
         let common = match self {
             Self::Run(a) => &a.common,
@@ -143,8 +147,8 @@ fn dispatch() -> ExitCode {
     }
 }
 
-/// Takes the plugins that stand before the subcommand out of the arguments: an option of
-/// the subcommand would hide them.
+/// Takes the plugins before the subcommand out of the arguments, because an option of the
+/// subcommand would hide them.
 fn leading_plugins(arguments: &mut Vec<OsString>) -> Vec<PathBuf> {
     let mut named = Vec::new();
     while let Some(first) = arguments.get(1).and_then(|a| a.to_str()) {
@@ -169,7 +173,7 @@ fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
     named.extend(of_config);
     let plugins::Searched { found, refused } = plugins::load(&named)?;
     match &cli.command {
-        // Their rows say it.
+        // The rows of these commands report refused plugins themselves.
         Command::List(_) | Command::Doctor(_) => {}
         _ => {
             found.iter().for_each(|line| failure::note(line));

@@ -1,4 +1,4 @@
-//! Models from files in place of a task's scene: MJCF, or a refined model of it.
+//! Models from files that replace a task's scene: MJCF, or a refined model.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use asid_effects::refined::Refined;
 use asid_effects::refined_model::RefinedModel;
 use asid_mjcf::Plant;
 
-/// The scene of a task as it is.
+/// The unchanged scene of a task.
 pub fn of_task(task: &dyn Task) -> RefinedModel {
     RefinedModel {
         scene: task.scene().clone(),
@@ -18,13 +18,13 @@ pub fn of_task(task: &dyn Task) -> RefinedModel {
     }
 }
 
-/// Compiles a scene, then its values and effects.
+/// Compiles a scene and applies its values and effects.
 pub fn compile(backend: &dyn Backend, source: &RefinedModel) -> Result<Arc<dyn Model>> {
     let model = backend.load(&source.scene)?;
     refine(backend, model, &source.scene, source, &[])
 }
 
-/// Gives a compiled scene the values and effects of a file, and some more effects.
+/// Applies the values and effects of a file to a compiled scene, and some more effects.
 pub fn refine(
     backend: &dyn Backend,
     model: Arc<dyn Model>,
@@ -46,16 +46,16 @@ pub fn refine(
     )?)
 }
 
-/// What a task needs of a model that takes the place of its scene.
+/// What a task needs of a model that replaces its scene.
 pub struct Needs<'a> {
     pub task: &'a dyn Task,
-    /// Names and places in the task's scene.
+    /// Layout of the task's scene.
     pub layout: &'a Layout,
     pub parameters: &'a [Parameter],
 }
 
 impl Needs<'_> {
-    /// Opens and compiles a file that is to be the task's `role`, and gives it `more` effects.
+    /// Opens and compiles the file of the task's `role`, and adds `more` effects.
     pub fn open(
         &self,
         backend: &dyn Backend,

@@ -1,4 +1,4 @@
-//! `asid new`: a folder that a plugin starts from, with all that it needs to be built.
+//! `asid new`: a folder with everything that a new plugin needs to be built.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,27 +19,28 @@ pub struct Arguments {
     kind: String,
     /// Write this folder; it must be empty or not exist. Its name becomes the plugin's
     dir: PathBuf,
-    /// Depend on the crates in this checkout of ASID; it must be of the revision that `asid doctor` shows [default: the one that this
-    /// program was built from]. The paths that are written lead there from the new folder
+    /// Depend on the crates in this checkout of ASID; it must be of the revision that `asid doctor`
+    /// shows [default: the one that this program was built from]. The paths that are written lead
+    /// there from the new folder
     #[arg(long, value_name = "CHECKOUT")]
     sources: Option<PathBuf>,
 }
 
-/// Something that can be started.
+/// A kind of plugin to start from.
 struct Kind {
     name: &'static str,
     about: &'static str,
-    /// Text in the files that holds the plugin's name, and how a new name is written in
-    /// its place, as `{}`.
+    /// Text in the files that holds the plugin's name, and its replacement, with `{}` for the new
+    /// name.
     rename: (&'static str, &'static str),
     /// The example's folder below `plugins`.
     example: &'static str,
-    /// True where a name is that of something built in, beside which a plugin would be
-    /// listed under another name than its own.
+    /// Whether a name belongs to something built in, so that a plugin would be listed under another
+    /// name.
     taken: fn(&str) -> bool,
-    /// A Cargo package: crates of this repository are named by their folders.
+    /// Whether it is a Cargo package, which refers to crates of this repository by their folders.
     cargo: bool,
-    /// Names and contents.
+    /// Names and contents of the files.
     files: &'static [(&'static str, &'static str)],
 }
 
@@ -49,19 +50,19 @@ const HEADER: (&str, &str) = (
     include_str!("../../backends/abi/include/asid_backend.h"),
 );
 
-/// How to write an engine.
+/// The guide to writing an engine.
 const ENGINE_GUIDE: (&str, &str) = ("GUIDE.md", include_str!("../../docs/add-a-backend.md"));
 
-/// The versions of dependencies that this program was built with: a plugin in Rust needs the same.
+/// The versions of dependencies that this program was built with; a plugin in Rust needs the same.
 const CARGO_LOCK: (&str, &str) = ("Cargo.lock", include_str!("../../Cargo.lock"));
 
-/// Where the sources that this program was built from were when it was built.
+/// Folder of the sources that this program was built from, at build time.
 const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
 
-/// A file of the sources, by which a folder is known for them.
+/// A file that identifies a folder as the sources.
 const OF_SOURCES: &str = "asid-core/Cargo.toml";
 
-/// All that there is to start from: the examples themselves, which tests build and run.
+/// All kinds of plugins. Their files are the examples themselves, which tests build and run.
 const KINDS: &[Kind] = &[
     Kind {
         name: "engine-c",
@@ -199,7 +200,7 @@ const KINDS: &[Kind] = &[
     },
 ];
 
-/// True where something of this kind and name is linked in, or is in other builds.
+/// Whether something of this kind and name is linked in, or is part of other builds.
 fn is_built_in<E: Entry>(name: &str) -> bool {
     let linked = |e: &E| matches!(e.origin(), Origin::Linked(_));
     registry::find::<E>(name).is_ok_and(linked) || super::list::missing(E::KIND, name).is_some()
@@ -210,11 +211,13 @@ impl Kind {
         PossibleValue::new(self.name).help(self.about)
     }
 
-    /// The text of a file, by its name in the folder, for a plugin of this name; `sources` is the way from it to the sources.
+    /// The text of a file of the folder, adapted to the plugin's name.
+    ///
+    /// `sources` is the relative path to the sources.
     fn text(&self, file: &str, text: &str, (name, sources): (&str, &str)) -> String {
         let (from, to) = self.rename;
         let text = if Path::new(file).extension().is_some_and(|e| e == "md") {
-            // A guide names files by the example's folder, which is the new one.
+            // A guide refers to files by the example's folder, which is the new folder.
             unlinked(&text.replace(&format!("plugins/{}/", self.example), ""))
         } else {
             text.to_owned()
@@ -228,7 +231,8 @@ impl Kind {
     }
 }
 
-/// A text whose links to other files of the repository are names of those files: outside of it they lead nowhere.
+/// A text in which links to other files of the repository become plain file names: outside the
+/// repository the links are dead.
 fn unlinked(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut rest = text;
@@ -317,7 +321,7 @@ fn sources(kind: &Kind, arguments: &Arguments) -> Result<Option<PathBuf>> {
     Err(error.into())
 }
 
-/// The way from one folder to another, with `/` between its parts: `../..` and on.
+/// The relative path from one folder to another, with `/` between its parts, such as `../..`.
 fn way(from: &Path, to: &Path) -> String {
     let full = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let (from, to) = (full(from), full(to));
@@ -333,13 +337,13 @@ fn way(from: &Path, to: &Path) -> String {
     }
 }
 
-/// The plugin's name: that of its folder.
+/// The plugin's name: the name of its folder.
 fn plugin_name(dir: &Path) -> Result<String> {
     let refuse = |message: &str| Error::File {
         path: dir.to_path_buf(),
         message: message.to_owned(),
     };
-    // `.` has a name too, where it is.
+    // Canonicalise first: `.` has a name too.
     let full = dir.canonicalize().unwrap_or_else(|_| dir.to_path_buf());
     let name = full
         .file_name()
@@ -353,7 +357,7 @@ fn plugin_name(dir: &Path) -> Result<String> {
     Ok(name.to_owned())
 }
 
-/// Makes the folder, or sees that it is empty.
+/// Creates the folder, or checks that it is empty.
 fn prepare(dir: &Path) -> Result<()> {
     let refuse = |message: &str| Error::File {
         path: dir.to_path_buf(),

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use asid_effects::refined_model::RefinedModel;
 
-/// Most threads that may be asked for.
+/// Largest number of threads that may be requested.
 const MAX_THREADS: usize = 1024;
 
-/// A number of threads.
+/// Parses a number of threads.
 pub fn threads(text: &str) -> Result<usize, String> {
     text.parse()
         .ok()
@@ -15,7 +15,8 @@ pub fn threads(text: &str) -> Result<usize, String> {
         .ok_or_else(|| format!("not a whole number from 1 to {MAX_THREADS}"))
 }
 
-/// A seed: a whole number that a TOML file can hold, so that every run can be repeated by its file.
+/// Parses a seed: a whole number that TOML can hold, so that every run can be repeated from its
+/// file.
 pub fn seed(text: &str) -> Result<u64, String> {
     /// Largest whole number of TOML.
     const LARGEST: u64 = i64::MAX as u64;
@@ -25,11 +26,11 @@ pub fn seed(text: &str) -> Result<u64, String> {
         .ok_or_else(|| format!("not a whole number from 0 to {LARGEST}"))
 }
 
-/// Most runs or episodes that may be asked for: far more than are ever played, and so few that they can be
-/// counted up from any seed.
+/// Largest number of runs or episodes that may be requested. It is far more than are ever played,
+/// and small enough to count up from any seed.
 const MAX_COUNT: u64 = 1_000_000;
 
-/// How many runs or episodes.
+/// Parses a number of runs or episodes.
 pub fn count(text: &str) -> Result<u64, String> {
     text.parse()
         .ok()
@@ -46,7 +47,8 @@ pub struct Common {
     /// Seed all random numbers with this
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
-    /// Use this many threads; results do not depend on it, but where --minutes or --limit ends the work [default: one a core]
+    /// Use this many threads; results do not depend on it, but where --minutes or --limit ends the
+    /// work [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub threads: Option<usize>,
     /// Settings below those of `config`, from elsewhere than the command line.
@@ -55,11 +57,12 @@ pub struct Common {
     /// Take settings from a file, such as a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Set a value, such as explorer.iterations=10; `asid config TASK|STUDY` lists them (repeatable)
+    /// Set a value, such as explorer.iterations=10; `asid config TASK|STUDY` lists them
+    /// (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Set the difficulty: default, or published (values of the paper or its code, defaults where they give none); a
-    /// single value by --set difficulty.NAME=VALUE
+    /// Set the difficulty: default, or published (values of the paper or its code, defaults where
+    /// they give none); a single value by --set difficulty.NAME=VALUE
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
     /// Write the results into this folder [default: the next free one below runs/]
@@ -107,17 +110,21 @@ pub struct Simulator {
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Real {
     /// Play in this kind of real world: matched (the simulator itself), crossed (the other engine),
-    /// perturbed (step, contacts, masses, servos and tracker a little off) or stand-in (another object)
-    /// [default: matched; with --real-model, --real-effect or another --real-backend the world is called custom]
+    /// perturbed (step, contacts, masses, servos and tracker a little off) or stand-in (another
+    /// object) [default: matched; with --real-model, --real-effect or another --real-backend the
+    /// world is called custom]
     #[arg(long, value_name = "KIND")]
     pub world: Option<String>,
-    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06 (repeatable) [default: drawn from the prior by the seed]
+    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06
+    /// (repeatable) [default: drawn from the prior by the seed]
     #[arg(long, value_name = "NAME=VALUE")]
     pub truth: Vec<String>,
-    /// Play the real world with this engine [default: the simulator's; the other one for --world crossed]
+    /// Play the real world with this engine [default: the simulator's; the other one for --world
+    /// crossed]
     #[arg(long, value_name = "NAME")]
     pub real_backend: Option<String>,
-    /// Simulate the real world with this model: MJCF, or a refined.toml of a diagnosis [default: the task's scene]
+    /// Simulate the real world with this model: MJCF, or a refined.toml of a diagnosis [default:
+    /// the task's scene]
     #[arg(long, value_name = "FILE")]
     pub real_model: Option<PathBuf>,
     /// Add an effect to the real world that the simulator lacks, such as
@@ -127,7 +134,7 @@ pub struct Real {
 }
 
 impl Real {
-    /// Whether an option describes it.
+    /// Whether any option describes a real world.
     #[must_use]
     pub fn is_described(&self) -> bool {
         let Self {
@@ -155,7 +162,7 @@ pub struct Worlds {
 }
 
 impl From<&Simulator> for Worlds {
-    /// Without a simulated real world.
+    /// The simulator alone, without a simulated real world.
     fn from(simulator: &Simulator) -> Self {
         Self {
             simulator: simulator.clone(),

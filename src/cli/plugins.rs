@@ -1,4 +1,4 @@
-//! Plugins of a call: those that are named, and those that are found.
+//! Plugins of a call: those named and those found.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -11,30 +11,30 @@ use sha2::{Digest as _, Sha256};
 
 use super::settings::{read_table, texts};
 
-/// A plugin that was found in a folder and cannot be used.
+/// A plugin that was found in a folder but cannot be used.
 #[derive(Clone, Debug)]
 pub struct Refused {
     /// Its file, or the place that cannot be searched.
     pub path: PathBuf,
-    /// Why, in one line that names it.
+    /// The reason, in one line that names the file.
     pub why: String,
 }
 
-/// What the folders gave that are searched.
+/// The result of searching the folders.
 pub struct Searched {
     /// A line for each plugin that was loaded.
     pub found: Vec<String>,
-    /// Those that cannot be used.
+    /// Plugins that cannot be used.
     pub refused: Vec<Refused>,
 }
 
-/// Files that were named in this call, without links in their paths, in order.
+/// Files named in this call, with links resolved, in order.
 static GIVEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Loads the plugins that are named, then those of the folders that are searched.
+/// Loads the named plugins, then those of the searched folders.
 ///
 /// # Errors
-/// When one that is named cannot be used. Those found in folders that cannot are handed back.
+/// When a named plugin cannot be used. Unusable plugins found in folders are returned.
 pub fn load(named: &[PathBuf]) -> Result<Searched> {
     for path in named {
         let loaded = asid_plugin::load(path)?;
@@ -69,11 +69,12 @@ pub fn load(named: &[PathBuf]) -> Result<Searched> {
     Ok(Searched { found, refused })
 }
 
-/// Plugins that a configuration names. Their code would run, so the call must trust them: by `--trust-plugins`, or
-/// by naming the file itself.
+/// Plugins that a configuration names. Their code would run, so the call must trust them, by
+/// `--trust-plugins` or by naming the file itself.
 ///
 /// # Errors
-/// When the configuration cannot be read, its plugins are not trusted, or one is not the file that it records.
+/// When the configuration cannot be read, its plugins are not trusted, or a file is not the one
+/// that it records.
 pub fn of_config(path: Option<&Path>, named: &[PathBuf], trusted: bool) -> Result<Vec<PathBuf>> {
     let Some(config) = path else {
         return Ok(Vec::new());
@@ -104,13 +105,13 @@ pub fn of_config(path: Option<&Path>, named: &[PathBuf], trusted: bool) -> Resul
     Ok(recorded.into_iter().map(|r| r.file).collect())
 }
 
-/// What leads from a plugin's file to its hash in a configuration: `FILE#sha256=HEX`.
+/// Separates a plugin's file from its hash in a configuration: `FILE#sha256=HEX`.
 const HASH: &str = "#sha256=";
 
 /// A plugin as a configuration records it.
 struct Recorded {
     file: PathBuf,
-    /// SHA-256 of the file, in hexadecimal; files that people write may leave it out.
+    /// SHA-256 of the file, in hexadecimal; hand-written files may omit it.
     hash: Option<String>,
 }
 
@@ -128,7 +129,7 @@ impl Recorded {
         }
     }
 
-    /// Whether the file is the one that was recorded; one that is not there is told of where it is loaded.
+    /// Checks that the file is the recorded one; a missing file is reported when it is loaded.
     fn check(&self, config: &Path) -> Result<()> {
         let (Some(wanted), Some(found)) = (&self.hash, sha256(&self.file)) else {
             return Ok(());
@@ -148,12 +149,12 @@ impl Recorded {
     }
 }
 
-/// A path without links in it, where it exists.
+/// A path with links resolved, where it exists.
 fn real(path: &Path) -> PathBuf {
     std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// SHA-256 of a file in hexadecimal; none where it cannot be read.
+/// SHA-256 of a file in hexadecimal; `None` where it cannot be read.
 fn sha256(file: &Path) -> Option<String> {
     use std::fmt::Write as _;
     let mut hash = Sha256::new();
@@ -168,7 +169,7 @@ fn sha256(file: &Path) -> Option<String> {
     )
 }
 
-/// Files with their hashes, as a result's configuration records them.
+/// Files with their hashes, in the form of a result's configuration.
 pub fn recorded(files: Vec<PathBuf>) -> Vec<PathBuf> {
     let with_hash = |file: PathBuf| match sha256(&file) {
         Some(hash) => PathBuf::from(format!("{}{HASH}{hash}", file.display())),
@@ -177,7 +178,7 @@ pub fn recorded(files: Vec<PathBuf>) -> Vec<PathBuf> {
     files.into_iter().map(with_hash).collect()
 }
 
-/// What a plugin brought that nobody named in this call, in one line.
+/// One line on a plugin that nobody named in this call, with its parts.
 fn said(loaded: &asid_plugin::Loaded, from: &str) -> String {
     let parts: Vec<String> = loaded
         .parts
@@ -191,7 +192,7 @@ fn said(loaded: &asid_plugin::Loaded, from: &str) -> String {
     )
 }
 
-/// Files that were named in this call, and those that registered what it uses.
+/// Files named in this call, and those that registered the parts in use.
 pub fn used(parts: &[Option<&'static Path>]) -> Vec<PathBuf> {
     let mut files = GIVEN.lock().unwrap_or_else(PoisonError::into_inner).clone();
     for file in parts.iter().flatten() {
@@ -202,7 +203,7 @@ pub fn used(parts: &[Option<&'static Path>]) -> Vec<PathBuf> {
     files
 }
 
-/// File of the plugin that registered a name, where one did.
+/// File of the plugin that registered a name; `None` where no plugin did.
 pub fn file_of<E: Entry>(name: &str) -> Option<&'static Path> {
     match find::<E>(name).ok()?.origin() {
         Origin::Loaded(file) => Some(file),

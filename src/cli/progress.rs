@@ -1,4 +1,5 @@
-//! Progress on standard error, with the time left: a bar on a terminal, elsewhere a line now and then.
+//! Progress on standard error with the time left: a bar on a terminal, an occasional line
+//! elsewhere.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -7,10 +8,12 @@ use std::time::{Duration, Instant};
 use asid_core::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Time between two lines where there is no terminal: a few in a log of an hour, and one soon enough to see that work goes on.
+/// Time between two lines where there is no terminal. A log of an hour gets few, and the first
+/// comes soon enough to show that work goes on.
 const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
-/// A bar for each stage, one after the other; a line every half minute where standard error is no terminal.
+/// A bar for each stage, one after the other; a line every half minute where standard error is no
+/// terminal.
 pub struct Bars {
     shown: Shown,
     stage: Mutex<Option<Stage>>,
@@ -24,13 +27,13 @@ enum Shown {
     Bars,
 }
 
-/// A stage under way.
+/// The current stage.
 enum Stage {
     Bar(ProgressBar),
     Lines(Lines),
 }
 
-/// A stage that is told in lines.
+/// A stage whose progress is printed as lines.
 struct Lines {
     name: String,
     done: u64,
@@ -40,7 +43,7 @@ struct Lines {
 }
 
 impl Lines {
-    /// The line that is due now, if one is.
+    /// The line that is due now, if any.
     fn due(&mut self) -> Option<String> {
         if self.told.elapsed() < BETWEEN_LINES {
             return None;
@@ -51,7 +54,7 @@ impl Lines {
     }
 }
 
-/// A stage as a line, after some seconds.
+/// A stage as a line, after `gone` seconds.
 fn told(name: &str, (done, total): (u64, u64), gone: f64) -> String {
     let left = gone * (total.max(done) - done) as f64 / done.max(1) as f64;
     match done {
@@ -61,7 +64,7 @@ fn told(name: &str, (done, total): (u64, u64), gone: f64) -> String {
 }
 
 impl Bars {
-    /// Progress unless `quiet`.
+    /// Shows progress unless `quiet`.
     pub fn new(quiet: bool) -> Self {
         let shown = match (quiet, std::io::stderr().is_terminal()) {
             (true, _) => Shown::Nothing,
@@ -89,7 +92,7 @@ impl Bars {
     }
 }
 
-/// Prints a line; a closed standard error is no reason to stop the work.
+/// Prints a line; a closed standard error does not stop the work.
 fn print(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }

@@ -1,4 +1,4 @@
-//! The readers of files that only the command line reads, for tests that give them damaged ones.
+//! The readers of files that only the command line reads, for tests with damaged files.
 
 use std::path::Path;
 
@@ -10,13 +10,13 @@ use asid_report::run::RunReport;
 use super::options::{Algorithms, Common, Worlds};
 use super::settings::{Config, Stage, difficulty};
 
-/// Task whose settings are read; any has the same sections.
+/// Task whose settings are read; all tasks have the same sections.
 const TASK: &str = "rod-balancing";
 
 /// Resolves the settings in a `config.toml` of a run.
 ///
 /// # Errors
-/// What the user is told.
+/// Those reported to the user.
 pub fn config(path: &Path) -> Result<()> {
     let task = (find::<TaskEntry>(TASK)?.make)()?;
     let common = Common {
@@ -33,7 +33,7 @@ pub fn config(path: &Path) -> Result<()> {
 /// Reads a `posterior.json`, as `asid solve` does.
 ///
 /// # Errors
-/// What the user is told.
+/// Those reported to the user.
 pub fn posterior(path: &Path) -> Result<()> {
     super::solve::read_posterior(path)?;
     Ok(())
@@ -42,7 +42,7 @@ pub fn posterior(path: &Path) -> Result<()> {
 /// Reads a `trace.json` of a run and draws its report, as `asid report` does.
 ///
 /// # Errors
-/// What the user is told.
+/// Those reported to the user.
 pub fn trace(path: &Path) -> Result<()> {
     let fail = |message: String| Error::File {
         path: path.to_owned(),

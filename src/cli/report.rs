@@ -26,14 +26,14 @@ fn read<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T> {
     Ok(value.map_err(|message| Error::File { path, message })?)
 }
 
-/// What `asid compare` made a result as: it writes the page of it once, from what it ran.
+/// The kind of a result whose page only `asid compare` writes, from its runs; `None` for others.
 fn drawn_by_compare(result: &serde_json::Value) -> Option<&'static str> {
     let kinds = [("rows", "comparison"), ("figure", "figure")];
     let kind = kinds.iter().find(|(key, _)| result.get(key).is_some());
     kind.map(|(_, kind)| *kind)
 }
 
-/// Writes `report.html` anew.
+/// Rewrites `report.html`.
 pub fn report(arguments: &Arguments) -> Result<()> {
     let folder = &arguments.dir;
     let value: serde_json::Value = read(folder, "result.json")?;

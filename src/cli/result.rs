@@ -12,7 +12,8 @@ use super::world::RealResult;
 /// Layout version of `result.json`.
 pub const SCHEMA: u32 = 1;
 
-/// A value or its deviation for people: four decimals, and two figures where these would not show it.
+/// Text of a value or its deviation: four decimals, or two significant figures if those would be
+/// zero.
 pub fn figure(x: f64) -> String {
     if x != 0.0 && x.abs() < 1e-3 {
         format!("{x:.1e}")
@@ -45,7 +46,7 @@ pub struct ParameterResult {
 }
 
 impl ParameterResult {
-    /// One for each unknown of a posterior, with its true value where that is known.
+    /// One for each unknown of a posterior, with its true value where known.
     pub fn all(posterior: &Posterior, truth: Option<&[f64]>) -> Vec<Self> {
         let marginals = posterior.marginals.iter().enumerate();
         marginals
@@ -132,7 +133,7 @@ impl Versions {
     }
 }
 
-/// What made a result that several engines have a part in.
+/// What made a result to which several engines contributed.
 #[derive(Serialize)]
 pub struct Program {
     pub asid: &'static str,
@@ -171,7 +172,7 @@ pub struct RunResult {
 }
 
 impl RunResult {
-    /// What came of a run.
+    /// The result of a run.
     ///
     /// # Errors
     /// When the task's tracked parts do not make sense.
@@ -214,7 +215,7 @@ impl RunResult {
     }
 }
 
-/// `name: 0.31 ± 0.02 m (95 %: 0.27 to 0.35)` of an unknown, for people.
+/// Text `name: 0.31 ± 0.02 m (95 %: 0.27 to 0.35)` of an unknown.
 pub fn parameter_line(m: &Marginal) -> String {
     let [low, high] = m.interval95.map(figure);
     let deviation = if m.unidentified {
@@ -229,8 +230,8 @@ pub fn parameter_line(m: &Marginal) -> String {
     )
 }
 
-/// What has to be said of a posterior beside its figures: where it piles up at an end of the
-/// prior's range, and what the data do not see.
+/// Caveats of a posterior: where it piles up at an end of the prior's range, and what the data do
+/// not determine.
 pub fn caveats(parameters: &[Parameter], belief: &Posterior) -> Vec<String> {
     let edges = parameters.iter().zip(&belief.marginals).filter_map(|(p, m)| {
         let end = m.at_edge?;
@@ -269,8 +270,8 @@ pub fn caveats(parameters: &[Parameter], belief: &Posterior) -> Vec<String> {
     edges.chain(unseen).collect()
 }
 
-/// How the task's two tracked parts are joined, from real episodes; `None` where it has no
-/// such parts or there is no episode.
+/// The joint between the task's two tracked parts, estimated from real episodes; `None` where there
+/// are no such parts or no episode.
 pub fn articulation(session: &Session, episodes: &[Episode]) -> Result<Option<Articulation>> {
     if episodes.is_empty() {
         return Ok(None);
@@ -279,7 +280,7 @@ pub fn articulation(session: &Session, episodes: &[Episode]) -> Result<Option<Ar
     of_episodes(&*session.task, layout, &session.signals, episodes)
 }
 
-/// `revolute joint (100 %), axis …, origin …` of an articulation, for people.
+/// Text `revolute joint (100 %), axis …, origin …` of an articulation.
 pub fn articulation_line(found: &Articulation) -> String {
     let (name, p) = match found.joint {
         Joint::Rigid => ("rigid", found.probability[0]),

@@ -127,7 +127,7 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
     Ok(pipeline::run(&problem, method, &mut world)?)
 }
 
-/// The command line of this process, quoted where it must be.
+/// The command line of this process, quoted where necessary.
 pub fn command_line() -> String {
     std::iter::once("asid".to_owned())
         .chain(std::env::args().skip(1).map(|a| {

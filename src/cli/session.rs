@@ -1,4 +1,4 @@
-//! A task on an engine with resolved settings: what every working subcommand opens.
+//! A task on an engine with resolved settings, opened by every working subcommand.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -117,7 +117,7 @@ impl Session {
         Ok(session)
     }
 
-    /// The problem as algorithms see it.
+    /// The problem as passed to algorithms.
     pub fn problem(&self) -> Problem<'_> {
         Problem {
             task: &*self.task,
@@ -133,12 +133,12 @@ impl Session {
         }
     }
 
-    /// Streams of the real world, which those of the method do not lead to.
+    /// Random streams of the real world, which cannot be derived from those of the method.
     fn world_streams(&self) -> Streams {
         Streams::new(self.config.seed).sealed("world")
     }
 
-    /// The start pose of a stage that is told it, in the order of its coordinates.
+    /// The start pose of a stage that takes one, in the order of its coordinates.
     pub fn start(&self) -> Vec<f64> {
         let coordinates = self.config.command.start(&*self.task).iter();
         coordinates
@@ -146,8 +146,8 @@ impl Session {
             .collect()
     }
 
-    /// The hidden truth: as given, and otherwise drawn by the seed from the condition's
-    /// range or from the prior.
+    /// The hidden truth: as given, else drawn by the seed from the condition's range or from the
+    /// prior.
     pub fn truth(&self) -> Vec<f64> {
         let streams = self.world_streams().child("truth");
         let conditions = self.task.conditions();
@@ -156,11 +156,12 @@ impl Session {
         self.parameters
             .iter()
             .map(|p| {
-                // Each has a stream of its own: an unknown more moves no other.
+                // Each unknown has its own stream, so that adding an unknown does not change the
+                // others.
                 let mut rng = streams.stream(&p.name);
                 let named = condition.and_then(|c| c.truth.iter().find(|(n, _)| *n == p.name));
                 let drawn = match named {
-                    // A fixed value to the bit, also on a logarithmic scale.
+                    // A fixed value stays exact to the bit, also on a logarithmic scale.
                     Some((_, [low, high])) if low == high => *low,
                     Some((_, range)) => Parameter {
                         range: *range,
@@ -179,7 +180,7 @@ impl Session {
             .collect()
     }
 
-    /// The simulated real world with this truth. A value that was given and lies outside of the prior is warned of.
+    /// The simulated real world with this truth. Warns of a given value outside the prior.
     ///
     /// # Errors
     /// When the engine fails, or the tracker's errors make no sense.
@@ -201,7 +202,7 @@ impl Session {
         Ok(world.with_tracker(self.real.tracker.clone())?)
     }
 
-    /// What is off in the real world, where it is a perturbed one.
+    /// The perturbations of the real world, where it is a perturbed one.
     pub fn perturbed(&self) -> Option<&PerturbedResult> {
         self.real.perturbed.as_ref()
     }
@@ -216,7 +217,8 @@ impl Session {
     }
 }
 
-/// What is to be said of a true value outside of the prior: how far beyond which end it lies; `None` of one inside.
+/// Warning about a true value outside the prior, with the end and the distance; `None` for one
+/// inside.
 fn outside(parameter: &Parameter, value: f64) -> Option<String> {
     let [low, high] = parameter.range;
     let (beyond, end) = if value < low {
@@ -239,7 +241,7 @@ fn outside(parameter: &Parameter, value: f64) -> Option<String> {
     ))
 }
 
-/// The engine of this name; one that was left out of the build says how to get it.
+/// The engine of this name; for one left out of the build, the error says how to get it.
 pub fn backend(name: &str) -> Result<Box<dyn Backend>> {
     match registry::find::<BackendEntry>(name) {
         Ok(entry) => Ok((entry.make)()?),

@@ -1,5 +1,6 @@
-//! The settings of a command: defaults, then the configuration file, then
-//! `--set`, then the options, resolved into one record that repeats the run.
+//! The settings of a command, resolved into one record that repeats the run.
+//!
+//! The defaults are overridden by the configuration file, then by `--set`, then by the options.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -104,7 +105,7 @@ const KEYS: [&str; 18] = [
     "parameter",
 ];
 
-/// Names that are used where nothing else is said.
+/// Algorithms that are used by default.
 pub struct Defaults {
     /// Explorer.
     pub explorer: &'static str,
@@ -114,7 +115,7 @@ pub struct Defaults {
     pub solver: &'static str,
 }
 
-/// The method that measures best, `asid`.
+/// The method that performs best in measurements, `asid`.
 pub const ASID: Defaults = Defaults {
     explorer: "fisher-cem",
     identifier: "reps",
@@ -122,8 +123,9 @@ pub const ASID: Defaults = Defaults {
 };
 
 impl Config {
-    /// Resolves the settings of a task for a stage, and the unknowns they make. The task is as hard
-    /// as [`difficulty::levels`] says.
+    /// Resolves the settings of a task for a stage, and the unknowns that follow from them.
+    ///
+    /// The difficulty of the task is that of [`difficulty::levels`].
     pub fn resolve(
         stage: Stage,
         task: &dyn Task,
@@ -134,7 +136,7 @@ impl Config {
         let Worlds { simulator, real } = worlds;
         let mut table = configured(common)?;
         difficulty::forget_noise(task, &mut table)?;
-        // A start pose in the settings of one stage means nothing to another.
+        // A start pose of another stage does not apply to this one.
         if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
             table.remove("start");
         }
@@ -221,8 +223,8 @@ impl Config {
         Ok((config, parameters))
     }
 
-    /// An identifier that learns from an explorer's episodes learns from those of this run's
-    /// explorer, unless it was told another.
+    /// Lets an identifier that learns from an explorer's episodes learn from this run's explorer,
+    /// unless the settings name another.
     fn learn_from_explorer(&mut self, given: &toml::Table) {
         if self.command == Stage::Run
             && !given.contains_key("explorer")
@@ -232,7 +234,7 @@ impl Config {
         }
     }
 
-    /// Files of plugins that were named, or that the settings name parts of.
+    /// Files of plugins that were named, or that provide parts named in the settings.
     fn used_plugins(&self) -> Vec<PathBuf> {
         use asid_effects::EffectEntry;
         use registry::{BackendEntry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry};
@@ -247,7 +249,7 @@ impl Config {
         let effects = self.real.effects.iter();
         let specs = effects.filter_map(|text| text.parse::<EffectSpec>().ok());
         files.extend(specs.map(|spec| file_of::<EffectEntry>(&spec.name)));
-        // A file that cannot be opened is told of where it is used.
+        // A file that cannot be opened is reported where it is used.
         let models = [&self.model, &self.real.model].into_iter().flatten();
         for model in models.filter_map(|path| RefinedModel::open(path).ok()) {
             let names = model.effects.iter().map(|e| &e.name);
@@ -257,7 +259,7 @@ impl Config {
     }
 }
 
-/// The explorer, told the file of `--policy`.
+/// The explorer, with the file of `--policy`.
 fn with_policy(mut explorer: Component, policy: Option<&Path>) -> Result<Component> {
     let Some(file) = policy else {
         return Ok(explorer);
@@ -282,13 +284,13 @@ pub fn check_condition(all: &[Condition], name: &str) -> Result<()> {
     Err(Error::unknown("condition", name, known()).into())
 }
 
-/// The file of a model: as given, else as a section says.
+/// The file of a model: the given one, else the one of a section.
 fn model_file(given: &Option<PathBuf>, table: &toml::Table) -> Result<Option<PathBuf>> {
     let set = text(table, "model")?.map(PathBuf::from);
     Ok(given.clone().or(set))
 }
 
-/// Name of the engine that is used where none is named.
+/// Name of the default engine.
 pub fn default_backend() -> String {
     registry::default_backend().map_or_else(String::new, |e| e.name.to_owned())
 }

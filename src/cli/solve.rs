@@ -18,13 +18,13 @@ use super::settings::Stage;
 use super::stage::{self, Named};
 use super::{interrupt, trace};
 
-/// What stands for the prior in place of a folder.
+/// The name of the prior in place of a folder.
 const PRIOR: &str = "prior";
 
-/// Samples that stand for the prior.
+/// Number of samples that represent the prior.
 const PRIOR_SAMPLES: usize = 256;
 
-/// Samples of the belief that the chosen action is tried at.
+/// Number of samples of the belief at which the chosen action is tried.
 const TRIES: usize = 16;
 
 /// Arguments of `solve`.
@@ -236,14 +236,14 @@ pub fn read_posterior(path: &Path) -> Result<Posterior> {
     Ok(posterior)
 }
 
-/// Task of the result that lies beside the posterior, where there is one.
+/// Task of the result beside the posterior, where there is one.
 fn task_of(folder: &Path) -> Option<String> {
     let text = std::fs::read_to_string(folder.join("result.json")).ok()?;
     let result: serde_json::Value = serde_json::from_str(&text).ok()?;
     Some(result.get("task")?.as_str()?.to_owned())
 }
 
-/// Checks that samples and weights are a distribution.
+/// Checks that samples and weights form a distribution.
 fn check(posterior: &Posterior) -> Result<(), String> {
     let (samples, weights) = (&posterior.samples, &posterior.weights);
     if samples.is_empty() || samples.len() != weights.len() {
@@ -269,8 +269,8 @@ fn check(posterior: &Posterior) -> Result<(), String> {
     Ok(())
 }
 
-/// Tries the action in the simulator: at samples of the belief, and at its mean, which
-/// is what the report shows.
+/// Tries the action in the simulator, at samples of the belief and at its mean. The report shows
+/// the latter.
 fn try_out(
     session: &Session,
     belief: &Posterior,

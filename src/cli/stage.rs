@@ -1,8 +1,7 @@
 //! What the stages `explore`, `identify` and `solve` share.
 //!
-//! They are the pipeline taken apart, for a real machine in between: `explore`
-//! gives commands to play, `identify` takes the log that came of them, `solve`
-//! gives the commands of the task.
+//! They are the parts of the pipeline, with a real machine in between. `explore` gives commands to
+//! play, `identify` takes the resulting log, `solve` gives the commands of the task.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -71,7 +70,7 @@ pub fn start_line(session: &Session) -> String {
     entries.join(", ")
 }
 
-/// Warns of a start pose outside what the task asks for.
+/// Warns of a start pose outside the task's range.
 pub fn check_start(session: &Session) {
     let coordinates = session.config.command.start(&*session.task);
     for (c, value) in coordinates.iter().zip(session.start()) {
@@ -84,7 +83,7 @@ pub fn check_start(session: &Session) {
     }
 }
 
-/// The report of a stage, still without what it did.
+/// The report of a stage, without the stage's own sections.
 pub fn report(session: &Session, wall_s: f64, files: &[(&str, &str)]) -> RunReport {
     let config = &session.config;
     let cost = session.cost(wall_s);
@@ -113,8 +112,8 @@ pub fn report(session: &Session, wall_s: f64, files: &[(&str, &str)]) -> RunRepo
     }
 }
 
-/// Writes what every stage writes and whatever `fill` adds, then the result or `lines`
-/// on standard output.
+/// Writes what every stage writes and whatever `fill` adds. Then prints the result or `lines` on
+/// standard output.
 pub fn finish(
     session: &Session,
     common: &Common,

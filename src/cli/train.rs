@@ -1,4 +1,4 @@
-//! `--train FILE` of `explore` and `identify`: what is learned beforehand, saved for later.
+//! `--train FILE` of `explore` and `identify`: what is learned beforehand, saved for later use.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -15,14 +15,14 @@ use super::session::Session;
 /// Name of the identifier that learns from an explorer.
 const ESTIMATOR: &str = asid_learned::estimator::NAME;
 
-/// The explorer to resolve settings of, where the identifier learns from one.
+/// The explorer whose settings to resolve, where the identifier learns from one.
 pub fn explorer_of(explorer: Option<&str>, identifier: Option<&str>) -> Option<String> {
     let learned = || asid_learned::Estimator::default().explorer;
     let given = explorer.map(str::to_owned);
     given.or_else(|| (identifier == Some(ESTIMATOR)).then(learned))
 }
 
-/// Tells the session's identifier whose episodes it learns from.
+/// Tells the session's identifier which explorer's episodes it learns from.
 pub fn learned_from(session: &mut Session, explorer: &str) -> Result<()> {
     let component = &mut session.config.identifier;
     match component.settings.get_mut("explorer") {
@@ -71,7 +71,7 @@ pub fn identifier(session: &Session, common: &Common, file: &Path) -> Result<()>
     finish(learned, "identifier", &component.name, common, file)
 }
 
-/// Says what was saved.
+/// Prints what was saved.
 fn finish(learned: bool, kind: &str, name: &str, common: &Common, file: &Path) -> Result<()> {
     if !learned {
         return Err(Error::Config {
@@ -81,7 +81,7 @@ fn finish(learned: bool, kind: &str, name: &str, common: &Common, file: &Path) -
         .into());
     }
     let mut stdout = std::io::stdout().lock();
-    // What a plugin saves may be of another format.
+    // A plugin may save another format.
     let Ok(Saved { description, .. }) = Saved::load(file) else {
         writeln!(stdout, "saved: {}", file.display())?;
         return Ok(());

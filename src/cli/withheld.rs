@@ -1,7 +1,8 @@
-//! `asid withheld`: diagnoses of cases whose cause is withheld, scored; and the making of such cases.
+//! `asid withheld`: answers cases whose cause is withheld and scores the answers; it also makes
+//! such cases.
 //!
-//! Each case is answered in a process of its own that sees a copy of the study and nothing else. The labels are read
-//! when every answer is there, and by this process alone.
+//! Each case is answered in a process of its own that sees a copy of the study and nothing else.
+//! The labels are read after every answer is there, and only by this process.
 
 mod cases;
 mod child;
@@ -52,7 +53,8 @@ pub struct Arguments {
     /// Make new cases in this folder; takes --seed
     #[arg(long, value_name = "DIR")]
     make: Option<PathBuf>,
-    /// Machines that others modelled, beside those of the project: a folder that withheld/models/fetch.py filled
+    /// Machines that others modelled, beside those of the project: a folder that
+    /// withheld/models/fetch.py filled
     #[cfg(feature = "mujoco")]
     #[arg(long, value_name = "DIR", requires = "make")]
     models: Option<PathBuf>,
@@ -93,14 +95,16 @@ pub struct Arguments {
     /// Score the answers that OUT holds, whatever made them, and answer nothing
     #[arg(long, requires = "cases")]
     only_score: bool,
-    /// Repeat the decisions of the answers that OUT holds with each number that decides halved and doubled; replays nothing
+    /// Repeat the decisions of the answers that OUT holds with each number that decides halved and
+    /// doubled; replays nothing
     #[arg(long, requires = "cases", conflicts_with_all = ["shard", "control", "only_score"])]
     sensitivity: bool,
-    /// Score by names alone: without replays no set counts as the same physics, and no gap as the best possible
+    /// Score by names alone: without replays no set counts as the same physics, and no gap as the
+    /// best possible
     #[arg(long, requires = "cases")]
     names_only: bool,
-    /// Spoil the check on purpose, to see that it fails: scrambled labels, noise in place of the logs, or a catalogue
-    /// without the true effects
+    /// Spoil the check on purpose, to see that it fails: scrambled labels, noise in place of the
+    /// logs, or a catalogue without the true effects
     #[arg(long, value_name = "NAME", requires = "cases")]
     control: Option<Control>,
     /// Leave out an effect of the catalogue (repeatable)

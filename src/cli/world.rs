@@ -1,4 +1,4 @@
-//! Opens the simulated real world: its model, its tracker, and what is off in it.
+//! Opens the simulated real world: its model, its tracker and its perturbations.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::model::{self, Needs};
 use super::session::{Session, backend, require};
 
-/// A real world that is open.
+/// An open real world.
 pub struct World {
     pub model: Arc<dyn Model>,
     pub tracker: TrackerErrors,
@@ -56,8 +56,9 @@ impl RealResult {
 }
 
 impl World {
-    /// Opens the world that the session's settings describe; `simulator` is the task's scene on the
-    /// method's engine, and `streams` draws what is off.
+    /// Opens the world that the session's settings describe.
+    ///
+    /// `simulator` is the task's scene on the method's engine; `streams` draws the perturbations.
     pub fn open(session: &Session, simulator: &Arc<dyn Model>, streams: Streams) -> Result<Self> {
         let real = &session.config.real;
         let effects = real

@@ -1,10 +1,10 @@
-//! Physics steps per second of a batch against a bare loop over `mj_step`.
+//! Physics steps per second of a batch, compared with a bare loop over `mj_step`.
 //!
-//! `cargo run --release -p asid-mujoco --example throughput [SCENE.xml [TARGET]]`
-//! needs `MUJOCO_DYNAMIC_LINK_DIR`. With a target, simulations differ in that
-//! parameter, and the time to set it is printed as well. Both sides step the same scene from the same
-//! state under the same commands, one thread against one and two against two,
-//! in turns; the best of several rounds counts, as other load only slows down.
+//! `cargo run --release -p asid-mujoco --example throughput [SCENE.xml [TARGET]]` needs
+//! `MUJOCO_DYNAMIC_LINK_DIR`. With a target, simulations differ in that parameter, and the time to
+//! set it is printed as well. Both sides step the same scene from the same state with the same
+//! commands, alternating, one thread against one and two against two. The best of several rounds
+//! counts, because other load can only slow a round down.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 
@@ -22,7 +22,7 @@ const ARM: &str = include_str!("arm.xml");
 const STEPS: usize = 500;
 const ROUNDS: usize = 5;
 
-/// Servo targets that wander around the keyframe's.
+/// Servo targets that vary around the keyframe's.
 fn commands(layout: &Layout, frames: usize) -> Vec<f64> {
     let base = layout
         .keyframes

@@ -1,8 +1,7 @@
 //! MuJoCo as an engine plugin.
 //!
-//! The same code that `--features mujoco` links in, behind the C ABI: with
-//! `asid --plugin libasid_engine_mujoco.so` a binary without MuJoCo gains it at
-//! run time.
+//! It is the code that `--features mujoco` links in, behind the C ABI. With `asid --plugin
+//! libasid_engine_mujoco.so` a binary without MuJoCo gains it at run time.
 
 asid_abi::export_backend!(
     "MuJoCo 3.17, double precision, the reference engine",

@@ -1,4 +1,4 @@
-//! What MuJoCo makes of a document.
+//! MuJoCo's compilation of a document.
 
 use asid_core::{Error, Layout, Result, Scene};
 use mujoco_rs::wrappers::mj_editing::{MjSpec, MjsBody};
@@ -6,21 +6,21 @@ use mujoco_rs::wrappers::mj_model::MjModel;
 
 use crate::{contact, ffi};
 
-/// What all batches of one compiled scene share.
+/// Data shared by all batches of one compiled scene.
 pub struct Compiled {
     /// The document.
     pub scene: Scene,
     /// MuJoCo's model of it.
     pub model: MjModel,
-    /// Names and places.
+    /// Names and indices.
     pub layout: Layout,
 }
 
 /// Compiles a scene with MuJoCo.
 ///
-/// `simple` allows MuJoCo's shortcuts for bodies whose inertia happens to be
-/// diagonal. A batch that moves centres of mass must do without: the sparsity
-/// of the inertia matrix is fixed when the model is compiled.
+/// `simple` allows MuJoCo's shortcuts for bodies whose inertia happens to be diagonal. A batch that
+/// moves centres of mass must not use them, because the sparsity of the inertia matrix is fixed at
+/// compilation.
 ///
 /// # Errors
 /// [`Error::Scene`] with MuJoCo's message in one line.
@@ -52,7 +52,7 @@ fn forbid_simple(body: &mut MjsBody) {
     }
 }
 
-/// A document that cannot be used, with the reason in one line.
+/// Error for a document that cannot be used, with the reason in one line.
 pub fn refused(scene: &Scene, message: &(impl ToString + ?Sized)) -> Error {
     Error::Scene {
         scene: scene.name().to_owned(),

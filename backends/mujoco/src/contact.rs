@@ -1,16 +1,17 @@
 //! Which contacts a model can make, and whether a geom's friction can act at all.
 //!
-//! MuJoCo takes the friction of a contact from an explicit `<pair>` where there
-//! is one, else from the geom of higher `priority`, else as the larger of the
-//! two. A parameter on a geom that is overruled everywhere would be silently
-//! without effect.
+//! MuJoCo takes the friction of a contact from an explicit `<pair>` if there is one, else from the
+//! geom of higher `priority`, else the larger of the two. A parameter on a geom that is always
+//! overruled would silently have no effect.
 
 use asid_core::layout::Layout;
 use mujoco_rs::mujoco_c::mjtDisableBit;
 use mujoco_rs::wrappers::mj_model::MjModel;
 
-/// Whether the model can make any contact, wherever its bodies are. Most arms cannot: a link does not collide with the one that carries it. A step of
-/// those needs no broad phase, which is a sixth of it.
+/// Whether the model can make any contact in any pose.
+///
+/// Most arms cannot, because a link does not collide with the one that carries it. Their steps need
+/// no broad phase, which is a sixth of a step.
 #[must_use]
 pub fn is_possible(model: &MjModel) -> bool {
     let geoms = model.geom_bodyid().len();
@@ -20,7 +21,8 @@ pub fn is_possible(model: &MjModel) -> bool {
         || (0..geoms).any(|a| (0..a).any(|b| touch(a, b)))
 }
 
-/// Whether MuJoCo leaves out all contacts between the bodies of two geoms: one carries the other, or an `<exclude>` names both.
+/// Whether MuJoCo omits all contacts between the bodies of two geoms: one carries the other, or an
+/// `<exclude>` names both.
 fn is_filtered(model: &MjModel, a: usize, b: usize) -> bool {
     let weld = |body: usize| model.body_weldid()[body] as usize;
     let body = |geom: usize| model.geom_bodyid()[geom] as usize;
@@ -36,8 +38,9 @@ fn is_filtered(model: &MjModel, a: usize, b: usize) -> bool {
     filters && carries || is_excluded
 }
 
-/// Says what overrules the friction of `geom` in all the contacts it can make;
-/// `None` where it counts in some, or where it can touch nothing.
+/// What overrules the friction of `geom` in all contacts that it can make.
+///
+/// `None` where its friction counts in some contact, or where it can touch nothing.
 #[must_use]
 pub fn overruled(model: &MjModel, layout: &Layout, geom: usize) -> Option<String> {
     let name = |g: usize| &layout.geoms[g];
@@ -71,7 +74,7 @@ pub fn overruled(model: &MjModel, layout: &Layout, geom: usize) -> Option<String
     why
 }
 
-/// Whether two geoms' contact bits match, on bodies that can move against each other.
+/// Whether two geoms' contact bits match and their bodies can move relative to each other.
 fn can_touch(model: &MjModel, a: usize, b: usize) -> bool {
     let (contype, conaffinity) = (model.geom_contype(), model.geom_conaffinity());
     let weld = |g: usize| model.body_weldid()[model.geom_bodyid()[g] as usize];
@@ -84,7 +87,8 @@ mod tests {
     use crate::compiled::compile;
     use asid_core::Scene;
 
-    /// Two links that hang from the world, the second with more of its body, and something in the world or beside it.
+    /// Two links attached to the world, the second with `in_fore` in its body, and something in the
+    /// world or beside it.
     fn model(beside: &str, in_fore: &str, after: &str) -> MjModel {
         let xml = format!(
             r#"<mujoco><worldbody>{beside}<body name="upper"><joint/><geom name="upper" size="0.1"/>

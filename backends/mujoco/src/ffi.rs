@@ -1,15 +1,13 @@
-//! The only place that talks to MuJoCo's C interface by pointers.
+//! The only module that uses MuJoCo's C interface by pointers.
 //!
-//! `mujoco-rs` has no batch calls, so the `mjb_*` functions of `mjbatch.h` are
-//! declared here by hand beside its types. [`Batch`] owns an `mjBatch`; a
-//! function given to [`Batch::apply`] sees one simulation at a time as a
-//! [`Sim`]. Everything above this module is safe code.
+//! `mujoco-rs` has no batch calls, so the `mjb_*` functions of `mjbatch.h` are declared here by
+//! hand beside its types. [`Batch`] owns an `mjBatch`; a function given to [`Batch::apply`] sees
+//! one simulation at a time as a [`Sim`]. Everything above this module is safe code.
 //!
-//! Two properties of the C side shape it. A fatal error inside a batch call
-//! unwinds by `longjmp` to the batch, over the frames of the function that was
-//! running: that function must own nothing that needs dropping while it is
-//! inside a [`Sim`] method. A fatal error anywhere else ends the process, so
-//! arguments are checked in Rust before they get here.
+//! Two properties of the C side determine its design. A fatal error inside a batch call unwinds by
+//! `longjmp` to the batch, over the frames of the running function. That function must own nothing
+//! that needs dropping while it is inside a [`Sim`] method. A fatal error anywhere else ends the
+//! process, so Rust checks all arguments first.
 
 mod mjbatch;
 mod quiet;
@@ -34,7 +32,7 @@ use mujoco_rs::wrappers::mj_model::MjModel;
 
 /// Entries of `mjData.warning` (`mjtWarning`).
 const WARNINGS: usize = 7;
-/// A model field with values of its own in each simulation; see [`Batch::expand`].
+/// A model field with separate values in each simulation; see [`Batch::expand`].
 #[derive(Clone, Copy, Debug)]
 pub struct Expanded(usize);
 
@@ -43,19 +41,19 @@ pub struct Batch {
     raw: NonNull<RawBatch>,
     size: usize,
     nstate: usize,
-    /// Storage of the expanded fields: first entry, entries a simulation.
+    /// Storage of the expanded fields: first entry, and entries per simulation.
     fields: Vec<(NonNull<f64>, usize)>,
 }
 
-// SAFETY: an mjBatch is bound to no thread: every call sets up the calling
-// thread anew, and `&mut self` keeps calls apart.
+// SAFETY: an mjBatch is not bound to a thread: every call sets up the calling thread anew, and
+// `&mut self` keeps calls apart.
 unsafe impl Send for Batch {}
 
 impl Batch {
-    /// Makes a batch of a copy of `model`.
+    /// Makes a batch from a copy of `model`.
     ///
     /// # Errors
-    /// MuJoCo's message where it refuses.
+    /// MuJoCo's message when it refuses.
     pub fn new(model: &MjModel, size: usize, threads: usize) -> Result<Self, String> {
         let nsim = c_int::try_from(size).map_err(|_| "too many simulations".to_owned())?;
         let config = BatchConfig {
@@ -95,7 +93,7 @@ impl Batch {
         self.nstate
     }
 
-    /// Where a state component (one `mjtState` bit) lies in a state row.
+    /// Range of a state component (one `mjtState` bit) in a state row.
     pub fn component(&mut self, bit: u32) -> Range<usize> {
         let mut len: c_int = 0;
         // SAFETY: a live batch; the address lies within its first state row.
@@ -125,12 +123,12 @@ impl Batch {
     }
 
     fn states(&mut self) -> &mut [f64] {
-        // SAFETY: `size x nstate` doubles that the batch keeps, and `&mut self`
-        // keeps others away.
+        // SAFETY: `size x nstate` doubles that the batch owns, and `&mut self` excludes other
+        // access.
         unsafe { sim::slice_mut(mjb_state(self.raw.as_ptr()), self.size * self.nstate) }
     }
 
-    /// Forgets the warnings of a simulation.
+    /// Clears the warnings of a simulation.
     pub fn clear_warnings(&mut self, sim: usize) {
         assert!(sim < self.size, "simulation {sim} of {}", self.size);
         // SAFETY: `size x WARNINGS` plain counters; `sim` is in range.
@@ -144,8 +142,9 @@ impl Batch {
         }
     }
 
-    /// Resets simulations, to keyframe 0 where `keyframe` is set, else to the
-    /// model's defaults. `ids` are strictly increasing and in range.
+    /// Resets simulations to keyframe 0 where `keyframe` is set, else to the model's defaults.
+    ///
+    /// `ids` are strictly increasing and in range.
     pub fn reset(&mut self, ids: &[c_int], keyframe: bool) {
         self.check(ids);
         let keys = vec![0; if keyframe { ids.len() } else { 0 }];
@@ -154,12 +153,13 @@ impl Batch {
         } else {
             std::ptr::null()
         };
-        // SAFETY: `ids` are checked; one key a simulation, or none; stage 0
-        // computes nothing. The caller asks for keyframe 0 only where there is one.
+        // SAFETY: `ids` are checked; one key per simulation, or none; stage 0 computes nothing. The
+        // caller requests keyframe 0 only where there is one.
         unsafe { mjb_reset(self.raw.as_ptr(), ids.as_ptr(), ids.len() as c_int, key, 0) };
     }
 
-    /// Gives a model field of doubles a value in each simulation, starting from the model's.
+    /// Gives a model field of doubles separate values in each simulation, initialised from the
+    /// model's.
     ///
     /// # Errors
     /// When there is no such field.
@@ -185,15 +185,15 @@ impl Batch {
     pub fn field(&mut self, field: Expanded, sim: usize) -> &mut [f64] {
         assert!(sim < self.size, "simulation {sim} of {}", self.size);
         let (storage, len) = self.fields[field.0];
-        // SAFETY: the storage is `size x len` doubles that the batch keeps until
-        // it is deleted; `sim` is in range and `&mut self` keeps others away.
+        // SAFETY: the storage is `size x len` doubles that the batch owns until it is deleted;
+        // `sim` is in range and `&mut self` excludes other access.
         unsafe { std::slice::from_raw_parts_mut(storage.as_ptr().add(sim * len), len) }
     }
 
-    /// Recomputes the constants that follow from changed model fields.
+    /// Recomputes the constants that depend on changed model fields.
     ///
     /// # Errors
-    /// MuJoCo's message of the first simulation it refuses, whose constants stay as they were.
+    /// MuJoCo's message of the first simulation it refuses, whose constants stay unchanged.
     pub fn set_const(&mut self, ids: &[c_int]) -> Result<(), String> {
         if ids.is_empty() {
             return Ok(());
@@ -207,7 +207,7 @@ impl Batch {
         }
     }
 
-    /// The error that a simulation raised in its last call, if it did, in one line.
+    /// The error that a simulation raised in its last call, in one line; `None` without an error.
     #[must_use]
     pub fn failure(&self, sim: usize) -> Option<String> {
         assert!(sim < self.size, "simulation {sim} of {}", self.size);
@@ -222,12 +222,14 @@ impl Batch {
         }
     }
 
-    /// Runs `function` on each simulation with its job (`jobs[i]` goes with
-    /// `ids[i]`), on all threads; `save` keeps the state it leaves. Returns how
-    /// many raised an error in MuJoCo; those keep the state from before.
+    /// Runs `function` on each simulation with its job (`jobs[i]` belongs to `ids[i]`), on all
+    /// threads.
     ///
-    /// `function` must own nothing that needs dropping while it calls a method
-    /// of [`Sim`]. A panic in it is raised again here.
+    /// `save` keeps the resulting state. Returns how many simulations raised an error in MuJoCo;
+    /// these keep their previous state.
+    ///
+    /// `function` must own nothing that needs dropping while it calls a method of [`Sim`]. A panic
+    /// in it is raised again here.
     pub fn apply<J, F>(&mut self, ids: &[c_int], jobs: &mut [J], function: &F, save: bool) -> usize
     where
         J: Send,
@@ -244,9 +246,9 @@ impl Batch {
             jobs: jobs.as_mut_ptr(),
             panic: Mutex::new(None),
         };
-        // SAFETY: `ids` are checked; `call` outlives the call, which joins all
-        // threads before it returns; `F` is `Sync` and `J` is `Send`, so threads
-        // may share the one and take one each of the other.
+        // SAFETY: `ids` are checked; `call` outlives the call, which joins all threads before it
+        // returns; `F` is `Sync` and `J` is `Send`, so threads may share the function and take one
+        // job each.
         let failed = unsafe {
             mjb_apply(
                 self.raw.as_ptr(),
@@ -267,7 +269,7 @@ impl Batch {
         failed as usize
     }
 
-    /// MuJoCo ends the process over bad ids, so they are checked first.
+    /// Checks ids first, because MuJoCo ends the process over bad ones.
     fn check(&self, ids: &[c_int]) {
         assert!(
             ids.windows(2).all(|w| w[0] < w[1])
@@ -286,7 +288,7 @@ impl Drop for Batch {
     }
 }
 
-/// What [`run`] gets: the function, its jobs, and where a panic of it waits.
+/// Argument of [`run`]: the function, its jobs, and the place for a panic.
 struct Call<'a, J, F> {
     function: &'a F,
     ids: &'a [c_int],
@@ -304,8 +306,8 @@ where
     let Ok(row) = call.ids.binary_search(&sim) else {
         return;
     };
-    // SAFETY: there are as many jobs as ids, and each simulation runs once a
-    // call, so nobody else has this one.
+    // SAFETY: there are as many jobs as ids, and each simulation runs once per call, so nobody else
+    // has this job.
     let job = unsafe { &mut *call.jobs.add(row) };
     // SAFETY: MuJoCo passes a model and data that belong together, for this call.
     let mut view = unsafe { Sim::new(m, d) };

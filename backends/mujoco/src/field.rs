@@ -30,7 +30,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// MuJoCo's name of it.
+    /// MuJoCo's name of the field.
     #[must_use]
     pub fn name(self) -> &'static CStr {
         match self {

@@ -1,12 +1,13 @@
-//! What an actuator remembers when an episode begins.
+//! An actuator's memory at the start of an episode.
 //!
-//! Before the first row of a log the command was the same as in it, so an actuator with a delay has a history of
-//! that command, and one with a first-order filter has settled on it. MuJoCo itself begins both at zero.
+//! Before the first row of a log the command was the same as in that row. An actuator with a delay
+//! therefore has a history of that command, and one with a first-order filter has settled on it.
+//! MuJoCo itself starts both at zero.
 
 use mujoco_rs::mujoco_c::mjtDyn;
 use mujoco_rs::wrappers::mj_model::MjModel;
 
-/// One number of a state row that takes a command.
+/// An entry of a state row that takes a command.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     /// Entry of the row.
@@ -16,15 +17,17 @@ struct Place {
     range: Option<[f64; 2]>,
 }
 
-/// Where the state row of a simulation remembers commands.
+/// Entries of a simulation's state row that remember commands.
 #[derive(Clone, Debug, Default)]
 pub struct CommandMemory {
     places: Vec<Place>,
 }
 
 impl CommandMemory {
-    /// Finds the places; activations begin at `act` and histories at `history` of a row. An activation that the
-    /// first keyframe sets (`fresh` is the row right after a reset) stays as it is.
+    /// Finds the entries; activations begin at `act` and histories at `history` of a row.
+    ///
+    /// An activation set by the first keyframe stays as it is; `fresh` is the row right after a
+    /// reset.
     pub fn of(model: &MjModel, act: usize, history: usize, fresh: &[f64]) -> Self {
         let mut places = Vec::new();
         for actuator in 0..model.nu() as usize {
@@ -46,7 +49,8 @@ impl CommandMemory {
             {
                 put(act + at);
             }
-            // A buffer holds two numbers of its own, the times of its samples, then the samples.
+            // A buffer holds two numbers of its own, then the times of its samples, then the
+            // samples.
             if let Ok(at) = usize::try_from(model.actuator_historyadr()[actuator]) {
                 let samples = model.actuator_history()[actuator][0] as usize;
                 (0..samples).for_each(|k| put(history + at + 2 + samples + k));
@@ -55,7 +59,7 @@ impl CommandMemory {
         Self { places }
     }
 
-    /// Fills a row in as if a command had been held for long.
+    /// Fills a row as if the command had been held for a long time.
     pub fn hold(&self, row: &mut [f64], command: &[f64]) {
         for place in &self.places {
             let value = command[place.actuator];

@@ -1,21 +1,19 @@
 //! Mass properties of a body that parameters change.
 //!
-//! A compiled model keeps mass, centre and principal inertia of each body and
-//! forgets the geoms they came from. Where a parameter moves or weighs a geom,
-//! its body is rebuilt from its geoms as the document describes them, with the
-//! formulas that all engines share.
+//! A compiled model stores mass, centre and principal inertia of each body, but not the geoms they
+//! came from. If a parameter changes a geom's position or mass, its body is rebuilt from its geoms
+//! in the document, with the formulas that all engines share.
 
 use asid_core::{Result, Scene};
 use asid_mjcf::mass::{GeomMass, MassProperties};
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// Relative difference below which geoms are taken to explain a body's mass
-/// properties: far above the rounding of two ways of summing them, far below
-/// any difference that means something.
+/// Relative difference below which the geoms explain a body's mass properties. It is far above the
+/// rounding of two ways of summing them, and far below any meaningful difference.
 const AGREEMENT: f64 = 1e-6;
 
-/// Mass properties as a compiled model holds them.
+/// Mass properties in the form of a compiled model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyInertia {
     /// Mass, kg.
@@ -29,7 +27,7 @@ pub struct BodyInertia {
 }
 
 impl BodyInertia {
-    /// Those of a body of a compiled model.
+    /// Mass properties of a body of a compiled model.
     #[must_use]
     pub fn of(model: &MjModel, body: usize) -> Self {
         Self {
@@ -40,7 +38,7 @@ impl BodyInertia {
         }
     }
 
-    /// Those of a union of geoms.
+    /// Mass properties of a union of geoms.
     #[must_use]
     pub fn of_geoms(geoms: &[GeomMass]) -> Self {
         let all = MassProperties::of_geoms(geoms);
@@ -53,7 +51,7 @@ impl BodyInertia {
         }
     }
 
-    /// Place of a principal axis in the order of the moments, the largest first.
+    /// Rank of a principal axis by its moment, the largest first.
     #[must_use]
     pub fn rank_of_axis(&self, axis: usize) -> usize {
         let own = self.inertia[axis];
@@ -64,7 +62,7 @@ impl BodyInertia {
         (0..3).filter(before).count()
     }
 
-    /// The principal axis at a place in the order of the moments, the largest first.
+    /// The principal axis of a rank by moment, the largest first.
     #[must_use]
     pub fn axis_of_rank(&self, rank: usize) -> usize {
         (0..3)
@@ -72,8 +70,8 @@ impl BodyInertia {
             .unwrap_or(rank)
     }
 
-    /// True where a body with these properties can exist: positive mass and
-    /// moments, none larger than the sum of the other two.
+    /// Whether a body with these properties can exist: positive mass and moments, none larger than
+    /// the sum of the other two.
     #[must_use]
     pub fn is_physical(&self) -> bool {
         let [a, b, c] = self.inertia;
@@ -96,8 +94,7 @@ impl BodyInertia {
         rotation * Matrix3::from_diagonal(&Vector3::from(self.inertia)) * rotation.transpose()
     }
 
-    /// True where both describe the same body, whatever the order of the
-    /// principal axes.
+    /// Whether both describe the same body, in any order of the principal axes.
     fn agrees(&self, other: &Self) -> bool {
         let scale = self.tensor().norm() / self.mass.max(f64::MIN_POSITIVE);
         let offset = (Vector3::from(self.ipos) - Vector3::from(other.ipos)).norm();
@@ -116,7 +113,7 @@ pub struct BodyGeoms {
     pub masses: Vec<GeomMass>,
 }
 
-/// Where a body's mass properties come from.
+/// Source of a body's mass properties.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
     /// From its geoms, which explain them.
@@ -127,8 +124,8 @@ pub enum Origin {
     Other(String),
 }
 
-/// Finds where the mass properties of `body` come from, by comparing what the
-/// engine compiled with what the document's geoms add up to.
+/// Finds the source of `body`'s mass properties by comparing the compiled ones with the sum of the
+/// document's geoms.
 ///
 /// # Errors
 /// When the document cannot be read.

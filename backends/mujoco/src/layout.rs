@@ -1,4 +1,4 @@
-//! Names and places of a compiled model.
+//! Names and indices of a compiled model.
 
 use asid_core::layout::{Actuator, Joint, JointKind, Keyframe, Layout, Sensor};
 use asid_core::{Error, Result};
@@ -8,8 +8,7 @@ use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 /// Reads the layout of a model compiled from the scene `name`.
 ///
 /// # Errors
-/// [`Error::Scene`] where the model has actuators with several inputs or
-/// outputs, which a control row has no place for.
+/// [`Error::Scene`] for actuators with several inputs or outputs, which do not fit a control row.
 pub fn layout(name: &str, model: &MjModel) -> Result<Layout> {
     if model.nactuator() != model.nu() || model.nout() != model.nu() {
         return Err(Error::Scene {

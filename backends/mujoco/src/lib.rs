@@ -48,12 +48,12 @@ pub struct MujocoBackend {
 }
 
 impl MujocoBackend {
-    /// The engine, once its library is seen to be of the version the bindings
-    /// are made for. From here on MuJoCo's messages reach neither the console
-    /// nor a log file.
+    /// The engine, after checking that its library has the version of the bindings.
+    ///
+    /// From then on MuJoCo's messages reach neither the console nor a log file.
     ///
     /// # Errors
-    /// [`Error::Missing`] where another version is linked.
+    /// [`Error::Missing`] when another version is linked.
     pub fn new() -> Result<Self> {
         let found = mujoco_rs::mujoco_version();
         if found != VERSION {

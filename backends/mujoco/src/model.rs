@@ -1,4 +1,4 @@
-//! MuJoCo's model as the contract has it.
+//! MuJoCo's model behind the contract.
 
 use std::sync::Arc;
 
@@ -21,9 +21,9 @@ impl MujocoModel {
     /// Compiles a scene.
     ///
     /// # Errors
-    /// [`asid_core::Error::Scene`] with MuJoCo's message where it refuses the document, and
-    /// for what a batch cannot hold: sleeping trees (their bookkeeping is not
-    /// part of a state) and actuators with several inputs.
+    /// [`asid_core::Error::Scene`] with MuJoCo's message where it refuses the document. Also for
+    /// sleeping trees, whose bookkeeping is not part of a state, and for actuators with several
+    /// inputs: a batch cannot hold either.
     pub fn load(scene: &Scene) -> Result<Self> {
         let model = compile(scene, true)?;
         if model.opt().enableflags & mjtEnableBit::mjENBL_SLEEP as i32 != 0 {

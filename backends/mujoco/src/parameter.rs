@@ -1,4 +1,4 @@
-//! The parameters of a batch: values in, model fields of a simulation out.
+//! The parameters of a batch: turns values into model fields of a simulation.
 
 use asid_core::Target;
 use asid_core::{Error, Result};
@@ -19,11 +19,12 @@ struct BodyPlan {
 }
 
 impl BodyPlan {
-    /// Mass properties for one simulation's values of all columns. Where geoms are among them,
-    /// a centre of mass moves by as much as its column differs from the scene, and a moment is
-    /// scaled by as much.
+    /// Mass properties for one simulation's values of all columns.
+    ///
+    /// If geoms are among them, a centre of mass moves by the difference between its column and the
+    /// scene, and a moment is scaled by their ratio.
     fn inertia(&self, columns: &[Column], values: &[f64]) -> BodyInertia {
-        // What the scene says stays what the engine compiled, to the bit.
+        // Nominal values keep what the engine compiled, to the bit.
         if self
             .parts
             .iter()
@@ -32,7 +33,7 @@ impl BodyPlan {
             return self.nominal.clone();
         }
         let mut out = self.nominal.clone();
-        // What the scene's own centre and moments are, of which those of the columns differ.
+        // The scene's own centre and moments, to which the columns' values are relative.
         let mut was = None;
         if let Some(geoms) = &self.geoms {
             let mut masses = geoms.masses.clone();
@@ -46,8 +47,8 @@ impl BodyPlan {
             out = BodyInertia::of_geoms(&masses);
             was = Some(BodyInertia::of_geoms(&geoms.masses));
         }
-        // The mass first: it scales the moments that the scene has, and a moment
-        // that is itself a parameter is then as given.
+        // The mass comes first: it scales the moments of the scene, and a moment that is itself a
+        // parameter then takes its given value.
         for &(column, part) in &self.parts {
             if part == Part::Mass {
                 let scale = values[column] / out.mass;
@@ -64,7 +65,7 @@ impl BodyPlan {
                     }
                 }
                 Part::Moment(axis) => match &was {
-                    // By its place in the order of size: the axes may come in another one.
+                    // Find the axis by its rank in size, because the order of the axes may change.
                     Some(was) => {
                         let axis = was.axis_of_rank(self.nominal.rank_of_axis(axis));
                         out.inertia[axis] *= values[column] / was.inertia[axis];
@@ -78,23 +79,23 @@ impl BodyPlan {
     }
 }
 
-/// A joint's axis, some of whose parts are columns.
+/// A joint's axis of which some components are columns.
 #[derive(Clone, Debug)]
 struct AxisPlan {
     joint: usize,
     nominal: [f64; 3],
-    /// Column and part.
+    /// Column and component.
     parts: Vec<(usize, usize)>,
 }
 
 impl AxisPlan {
-    /// The axis for one simulation's values of all columns, of length 1; `None` where it has no direction.
+    /// The unit axis for one simulation's values of all columns; `None` where it has no direction.
     fn axis(&self, values: &[f64]) -> Option<[f64; 3]> {
         let mut axis = self.nominal;
         for &(column, part) in &self.parts {
             axis[part] = values[column];
         }
-        // What the scene says stays what the engine compiled, to the bit.
+        // Nominal values keep what the engine compiled, to the bit.
         if axis == self.nominal {
             return Some(axis);
         }
@@ -186,14 +187,14 @@ impl Plan {
         &self.columns
     }
 
-    /// True where a body's centre or axes may move, or a joint's axis turn, so that no shortcut for
-    /// bodies of diagonal inertia holds.
+    /// Whether a body's centre or axes may move, or a joint's axis turn. Then no shortcut for
+    /// bodies of diagonal inertia is valid.
     #[must_use]
     pub fn moves_mass(&self) -> bool {
         !(self.bodies.is_empty() && self.axes.is_empty())
     }
 
-    /// True where constants of the model follow from a column.
+    /// Whether model constants depend on a column.
     #[must_use]
     pub fn derives(&self) -> bool {
         self.columns.iter().any(|c| c.derives)
@@ -204,7 +205,7 @@ impl Plan {
         self.columns.iter().map(|c| c.nominal)
     }
 
-    /// Gives the fields in use values of their own in each simulation.
+    /// Expands the fields in use, so that each simulation has its own values.
     ///
     /// # Errors
     /// When the engine lacks a field.
@@ -264,8 +265,9 @@ impl Plan {
         Ok(())
     }
 
-    /// Writes one simulation's values, checked before; `before` are the values it
-    /// has. Returns whether constants of its model must be recomputed.
+    /// Writes one simulation's checked values; `before` are its current values.
+    ///
+    /// Returns whether constants of its model must be recomputed.
     pub fn write(
         &self,
         batch: &mut Batch,

@@ -8,12 +8,12 @@ use mujoco_rs::wrappers::mj_model::MjModel;
 use crate::ffi::{BadNumber, Sim, is_bad};
 use crate::target::Column;
 
-/// What has to be computed before a row can be read.
+/// What must be computed before a row can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
     /// Nothing: the row is part of the state.
     State,
-    /// Positions, velocities and what follows from them.
+    /// Positions, velocities and quantities derived from them.
     Velocity,
     /// Accelerations and forces.
     Acceleration,
@@ -44,11 +44,11 @@ impl Stage {
 pub struct Frames<'a> {
     /// The rollout.
     pub rollout: &'a Rollout<'a>,
-    /// Frames to run, of the rollout's.
+    /// The frames of the rollout to run.
     pub range: std::ops::Range<usize>,
     /// Length of a control row.
     pub nu: usize,
-    /// What a row needs.
+    /// What a row requires.
     pub stage: Stage,
     /// Address and length of each sensor.
     pub sensors: &'a [(usize, usize)],
@@ -58,8 +58,7 @@ pub struct Frames<'a> {
     pub columns: &'a [Column],
 }
 
-/// Whether the model's integrator lets a step be taken in two halves; the
-/// stages of Runge-Kutta do not.
+/// Whether the model's integrator allows a step in two halves; Runge-Kutta's stages do not.
 #[must_use]
 pub fn has_halves(model: &MjModel) -> bool {
     model.opt().integrator != mjtIntegrator::mjINT_RK4 as i32
@@ -75,16 +74,17 @@ pub struct Job<'a> {
     pub frames: usize,
     /// Physics steps taken.
     pub steps: u64,
-    /// Why and when it stopped, where it did.
+    /// Why and when it stopped; `None` if it did not.
     pub stopped: Option<(f64, BadNumber)>,
-    /// The simulation's parameters: as set, as a hook wants them, as the model has them.
-    /// Empty without a hook.
+    /// The simulation's parameters: as set, as a hook wants them, and as the model has them. Empty
+    /// without a hook.
     pub parameters: [Vec<f64>; 3],
 }
 
-/// Shows the parameters to a hook and writes what it changed into the model; see
-/// [`asid_core::Capabilities::LIVE_PARAMETERS`]. Returns whether the model changed, or
-/// `None` where a number is bad.
+/// Shows the parameters to a hook and writes its changes into the model; see
+/// [`asid_core::Capabilities::LIVE_PARAMETERS`].
+///
+/// Returns whether the model changed, or `None` if a number is bad.
 fn call_hook(
     job: &mut Job<'_>,
     sim: &mut Sim<'_>,
@@ -118,7 +118,7 @@ fn call_hook(
     Some(true)
 }
 
-/// Writes the columns that may change during a rollout, where they differ from `written`.
+/// Writes the live columns that differ from `written`.
 fn write_live(sim: &mut Sim<'_>, columns: &[Column], wanted: &[f64], written: &mut [f64]) {
     for (column, (&value, before)) in columns.iter().zip(wanted.iter().zip(&mut *written)) {
         if value != *before {
@@ -130,14 +130,16 @@ fn write_live(sim: &mut Sim<'_>, columns: &[Column], wanted: &[f64], written: &m
     }
 }
 
-/// Runs the frames of one simulation. It allocates nothing and owns nothing
-/// that needs dropping, as [`crate::ffi::Batch::apply`] asks.
+/// Runs the frames of one simulation.
+///
+/// It allocates nothing and owns nothing that needs dropping, as [`crate::ffi::Batch::apply`]
+/// requires.
 pub fn run(job: &mut Job<'_>, sim: &mut Sim<'_>, frames: &Frames<'_>) {
     let Frames {
         rollout, nu, stage, ..
     } = *frames;
     let width = rollout.record.width();
-    // True where the first half of the next step is done.
+    // Whether the first half of the next step is done.
     let mut half_done = false;
     for frame in frames.range.clone() {
         let command = match rollout.control {
@@ -157,7 +159,7 @@ pub fn run(job: &mut Job<'_>, sim: &mut Sim<'_>, frames: &Frames<'_>) {
             if let Some(hook) = rollout.hook {
                 let step = frame * rollout.substeps + substep;
                 match call_hook(job, sim, frames, (hook, step), command) {
-                    // The first half of a step knows the parameters of before.
+                    // The first half of a step used the previous parameters.
                     Some(changed) => half_done &= !changed,
                     None => {
                         job.stopped = Some((sim.time(), BadNumber::Command));
@@ -186,14 +188,14 @@ pub fn run(job: &mut Job<'_>, sim: &mut Sim<'_>, frames: &Frames<'_>) {
         );
         job.frames = frame + 1;
     }
-    // Forces belong to the rollout and not to the state that it leaves.
+    // Forces belong to the rollout, not to the state that it leaves.
     sim.wrenches().fill(0.0);
     sim.hook_view().3.fill(0.0);
     let [set, _, written] = &mut job.parameters;
     write_live(sim, frames.columns, set, written);
 }
 
-/// Computes what a row needs for the present state.
+/// Computes what a row requires in the current state.
 pub fn prepare(sim: &mut Sim<'_>, stage: Stage) {
     match stage {
         Stage::State => {}

@@ -16,8 +16,8 @@ use crate::parameter::{Fields, Plan};
 use crate::rollout::{Stage, has_halves, prepare, read};
 use crate::state::{SavedStates, StateLayout};
 
-/// Largest memory for the state rows of a batch, bytes. Beyond it the C++
-/// allocator would end the process.
+/// Largest memory for the state rows of a batch, bytes. Above it the C++ allocator would end the
+/// process.
 const MAX_STATE_BYTES: usize = 8 << 30;
 
 /// A batch of simulations of one scene.
@@ -29,10 +29,11 @@ pub struct MujocoSimulator {
     fresh: Vec<f64>,
     plan: Plan,
     fields: Fields,
-    /// Present values of the parameters, `n x columns`.
+    /// Current values of the parameters, `n x columns`.
     values: Vec<f64>,
     status: Vec<Status>,
-    /// Which episodes have begun but not run: actuators with a memory then settle on the first command.
+    /// Which episodes have begun but taken no step: actuators with a memory then settle on the
+    /// first command.
     begun: Vec<bool>,
     memory: CommandMemory,
     /// First entry of `qpos` of each quaternion.
@@ -44,7 +45,7 @@ pub struct MujocoSimulator {
 }
 
 impl MujocoSimulator {
-    /// Makes a batch, every simulation reset and with nominal parameters.
+    /// Makes a batch with every simulation reset and with nominal parameters.
     ///
     /// # Errors
     /// [`Error::Config`] for a size of 0 or one that does not fit in memory.
@@ -165,7 +166,7 @@ impl Simulator for MujocoSimulator {
                 positions[at..at + 4].iter_mut().for_each(|x| *x /= length);
             }
             row[self.states.qvel.clone()].copy_from_slice(&qvel[i * nv..(i + 1) * nv]);
-            // Nothing else remembers the state from before.
+            // Nothing else remembers the previous state.
             for part in &self.states.memory {
                 row[part.clone()].copy_from_slice(&self.fresh[part.clone()]);
             }

@@ -1,8 +1,7 @@
-//! State rows: where their parts lie, and snapshots of them.
+//! State rows: the positions of their parts, and snapshots of them.
 //!
-//! MuJoCo's `mjSTATE_INTEGRATION` row is everything a step reads and did not
-//! compute itself, the solver's starting point included, so a copied row goes
-//! on to the bit.
+//! MuJoCo's `mjSTATE_INTEGRATION` row contains everything that a step reads and does not compute
+//! itself, including the solver's starting point. A copied row therefore continues to the bit.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -22,13 +21,13 @@ pub struct StateLayout {
     pub qpos: Range<usize>,
     /// Velocities.
     pub qvel: Range<usize>,
-    /// What the past left behind besides position and velocity: activations
-    /// and delay buffers of actuators and sensors, the solver's starting point.
+    /// Remaining memory of the past: activations, delay buffers of actuators and sensors, and the
+    /// solver's starting point.
     pub memory: [Range<usize>; 3],
 }
 
 impl StateLayout {
-    /// Reads the layout off a batch.
+    /// Reads the layout from a batch.
     pub fn of(batch: &mut Batch) -> Self {
         let mut part = |bit: mjtState| batch.component(bit as u32);
         Self {
@@ -44,14 +43,14 @@ impl StateLayout {
     }
 }
 
-/// What a snapshot holds.
+/// Content of a snapshot.
 pub struct SavedStates {
-    /// The scene it is of.
+    /// The scene of the states.
     pub compiled: Arc<Compiled>,
-    /// State rows one after the other.
+    /// State rows, concatenated.
     pub rows: Vec<f64>,
     /// Status of each row.
     pub status: Vec<Status>,
-    /// Whether each row's episode has begun but not run.
+    /// Whether each row's episode has begun but taken no step.
     pub begun: Vec<bool>,
 }

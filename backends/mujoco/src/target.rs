@@ -1,8 +1,7 @@
-//! From a target's name to entries of model fields.
+//! Resolves a target's name into entries of model fields.
 //!
-//! Each target is resolved once, when a batch is made, into a [`Column`]: which
-//! entries of which field take its value, or which part of which body's mass
-//! properties it is.
+//! Each target is resolved once, when a batch is made, into a [`Column`]. It says which entries of
+//! which field take its value, or which part of which body's mass properties it is.
 
 mod geom;
 mod joint;
@@ -15,7 +14,7 @@ use crate::field::Field;
 use crate::inertia::BodyGeoms;
 use resolver::Resolver;
 
-/// Values that make sense for a parameter.
+/// Valid values of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Domain {
     Any,
@@ -24,12 +23,12 @@ enum Domain {
     Negative,
 }
 
-/// What a parameter is to its body's mass properties.
+/// The part of its body's mass properties that a parameter sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Mass of one of its geoms.
     GeomMass(usize),
-    /// Place of one of its geoms along an axis.
+    /// Position of one of its geoms along an axis.
     GeomPosition(usize, usize),
     /// Its mass.
     Mass,
@@ -40,7 +39,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// True where a geom is changed and the body follows.
+    /// Whether a geom is changed and the body follows.
     #[must_use]
     pub fn of_geom(self) -> bool {
         matches!(self, Self::GeomMass(_) | Self::GeomPosition(..))
@@ -52,18 +51,18 @@ impl Part {
 pub struct Column {
     /// Its name.
     pub target: Target,
-    /// Value in the scene as it is.
+    /// Value in the unchanged scene.
     pub nominal: f64,
     domain: Domain,
     /// Entries that take the value times a factor.
     pub entries: Vec<(Field, usize, f64)>,
     /// Part of a body's mass properties.
     pub part: Option<(usize, Part)>,
-    /// The geoms of that body, where they make its mass properties.
+    /// The geoms of that body, if they determine its mass properties.
     pub geoms: Option<BodyGeoms>,
-    /// Joint whose axis it is a part of, and which.
+    /// Joint whose axis it belongs to, and the component.
     pub axis: Option<(usize, usize)>,
-    /// Whether constants of the model follow from it.
+    /// Whether model constants depend on it.
     pub derives: bool,
 }
 
@@ -71,8 +70,8 @@ impl Column {
     /// Finds what a target changes.
     ///
     /// # Errors
-    /// [`Error::UnknownName`] where no element has the name,
-    /// [`Error::Parameter`] where it has no such attribute to change.
+    /// [`Error::UnknownName`] when no element has the name, [`Error::Parameter`] when it has no
+    /// such attribute to change.
     pub fn resolve(compiled: &Compiled, target: &Target) -> Result<Self> {
         let resolver = Resolver { compiled, target };
         match target.element.as_str() {
@@ -88,7 +87,7 @@ impl Column {
     /// Checks a value.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where it is not finite or not physical.
+    /// [`Error::Parameter`] when it is not finite or not physical.
     pub fn check(&self, value: f64) -> Result<()> {
         let (good, wanted) = match self.domain {
             Domain::Any => (true, "finite"),

@@ -1,4 +1,4 @@
-//! Parameters: each target acts, and mass properties follow as if compiled.
+//! Parameters: each target has an effect, and mass properties change as if compiled.
 
 #![allow(clippy::unwrap_used)]
 
@@ -53,8 +53,8 @@ fn every_target_reads_its_nominal_value_and_acts() {
                 .map(|(a, b)| (a - b).abs())
                 .fold(0.0, f64::max)
         };
-        // A batch that moves mass is compiled without shortcuts for diagonal
-        // inertia: the same motion up to rounding, which contact amplifies.
+        // A batch that moves mass is compiled without shortcuts for diagonal inertia: the same
+        // motion up to rounding, which contact amplifies.
         assert!(
             apart(same) < 1e-8,
             "{target}: nominal moved {}",
@@ -65,7 +65,7 @@ fn every_target_reads_its_nominal_value_and_acts() {
             "{target}: moved only {}",
             apart(changed)
         );
-        // Back to nominal: as if never changed.
+        // Back to nominal: as if it had never changed.
         simulator.set_parameters(&[1], &[found]).unwrap();
         simulator.reset(&[0, 1]).unwrap();
         let out = roll(&mut simulator, 100, 5, &waves(100), &record);
@@ -120,15 +120,14 @@ fn a_changed_geom_is_as_if_compiled() {
         .zip(&want)
         .map(|(a, b)| (a - b).abs())
         .fold(0.0, f64::max);
-    // Two ways to sum the same inertia differ by rounding; a second of a
-    // two-link arm amplifies that little.
+    // Two ways to sum the same inertia differ by rounding; a second of a two-link arm amplifies it
+    // little.
     assert!(worst < 1e-9, "{worst}");
 }
 
 #[test]
 fn a_free_ball_with_its_weight_moved_tumbles_as_if_compiled() {
-    // A centred ball is compiled with shortcuts that no longer hold once its
-    // centre of mass moves.
+    // A centred ball is compiled with shortcuts that are invalid once its centre of mass moves.
     let changed = FALLING.replace(
         r#"size="0.1" mass="0.5""#,
         r#"size="0.1" mass="0.5" pos="0.03 0 0.01""#,
@@ -151,7 +150,7 @@ fn a_free_ball_with_its_weight_moved_tumbles_as_if_compiled() {
 
 #[test]
 fn a_body_mass_scales_its_inertia() {
-    // A uniform body of twice the mass under twice the torque moves the same.
+    // A uniform body of twice the mass with twice the torque moves the same.
     let xml = |density: f64, gear: f64| {
         format!(
             r#"<mujoco><option gravity="0 0 0"/><worldbody><body name="rod"><joint name="hinge" axis="0 1 0"/>
@@ -284,18 +283,18 @@ fn friction_without_effect_is_refused() {
     let target = "geom/ball/friction/0".parse().unwrap();
     let nominal = |xml: &str| load(xml).nominal(&target).map_err(|e| e.to_string());
     assert_eq!(nominal(ARM), Ok(0.3));
-    // The floor and the arm rule the ball.
+    // The floor and the arm have priority over the ball.
     let above = ARM.replace("<geom name=", "<geom priority=\"2\" name=");
     let above = above.replace("<geom priority=\"2\" name=\"ball\"", "<geom name=\"ball\"");
     let error = nominal(&above).unwrap_err();
     assert!(error.contains("higher priority"), "{error}");
-    // With the floor alone above it, the arm still meets its friction.
+    // With only the floor above it, the ball's friction still counts with the arm.
     let floor = ARM.replace(
         "<geom name=\"floor\"",
         "<geom priority=\"1\" name=\"floor\"",
     );
     assert_eq!(nominal(&floor), Ok(0.3));
-    // A pair, and contact bits that leave nothing else.
+    // A pair, and contact bits that allow nothing else.
     let pair = floor
         .replace(
             "<keyframe>",

@@ -1,4 +1,5 @@
-//! Places, axes, limits and rests as parameters: a changed one is as if the document had been written so.
+//! Positions, axes, limits and rest positions as parameters: a changed value acts as if it were in
+//! the document.
 
 #![allow(clippy::unwrap_used)]
 
@@ -27,7 +28,7 @@ const ARM: &str = r#"
   </actuator>
 </mujoco>"#;
 
-/// Targets with values, and the piece of the document that says so with what it then says.
+/// Targets with values, and the piece of the document that sets them, before and after.
 const CASES: [(&[&str], &[f64], &str, &str); 7] = [
     (
         &["body/lower/pos/0", "body/lower/pos/2"],
@@ -100,7 +101,7 @@ fn a_changed_parameter_is_as_if_written_in_the_document() {
             let pairs = x.iter().zip(y);
             pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
-        // Rounding: the engine's shortcuts differ where an axis may turn.
+        // Rounding: the engine's shortcuts differ if an axis may turn.
         assert!(apart(same, &plain) < 1e-9, "{targets:?}");
         assert!(
             apart(changed, &expected) < 1e-9,

@@ -1,4 +1,4 @@
-//! What goes wrong stays where it is, and is said.
+//! Failures stay local and are reported.
 
 #![allow(clippy::unwrap_used)]
 
@@ -16,7 +16,7 @@ fn a_diverged_simulation_stands_still_and_disturbs_nobody() {
     let mut simulator = batch(&model, 3, 2, &[]);
     let ball = model.layout().body("ball").unwrap();
     let mut wrench = vec![0.0; 3 * 10 * 6];
-    // From frame 4 on, a force on the second that no double survives.
+    // From frame 4 on, the second gets a force that overflows a double.
     for frame in 4..10 {
         wrench[(10 + frame) * 6] = 1e200;
     }
@@ -34,19 +34,19 @@ fn a_diverged_simulation_stands_still_and_disturbs_nobody() {
     let Status::Diverged { time, message } = &simulator.status()[1] else {
         panic!("it runs on");
     };
-    // 4 frames of 5 steps of 2 ms, and the step that went wrong.
+    // 4 frames of 5 steps of 2 ms, plus the failed step.
     assert!((time - 0.042).abs() < 1e-9, "{time}");
     assert!(message.contains("0.042"), "{message}");
     let rows: Vec<&[f64]> = out.chunks_exact(width).collect();
     assert!(rows[10..14].iter().all(|r| r.iter().all(|x| x.is_finite())));
     assert!(rows[14..20].iter().all(|r| r.iter().all(|x| x.is_nan())));
 
-    // The others are as if alone.
+    // The others behave as if alone.
     let alone = roll(&mut batch(&model, 1, 1, &[]), 10, 5, &control, &record);
     assert_eq!(bits(&alone), bits(&out[..10 * width]));
     assert_eq!(bits(&alone), bits(&out[20 * width..]));
 
-    // It takes no part, also after set_state, until it is reset.
+    // It does not take part until it is reset, even after set_state.
     let taken = simulator.steps_taken();
     let out = roll(&mut simulator, 2, 5, &waves(2), &record);
     assert!(out[2 * width..4 * width].iter().all(|x| x.is_nan()));
@@ -74,7 +74,7 @@ fn an_absurd_velocity_diverges_instead_of_restarting() {
     assert!(out[9..].iter().all(|x| x.is_nan()));
     assert!(simulator.status()[0].is_running());
     assert!(!simulator.status()[1].is_running());
-    // A snapshot carries the status, and a good state brings it back.
+    // A snapshot carries the status, and a good state restores it.
     let saved = simulator.save(&[0, 1]).unwrap();
     simulator.copy_state(&[0], &[1]).unwrap();
     assert!(simulator.status()[1].is_running());
@@ -84,7 +84,7 @@ fn an_absurd_velocity_diverges_instead_of_restarting() {
 
 #[test]
 fn an_error_inside_the_engine_stops_its_simulation_alone() {
-    // Memory for the solver's stack that suffices in the air and not in contact.
+    // The solver's stack is large enough in the air, but not in contact.
     let starved = |bytes: usize| {
         let xml = ARM.replace(
             "<worldbody>",

@@ -1,4 +1,4 @@
-//! States: exact snapshots, copies, resets, and readings that are not late.
+//! States: exact snapshots, copies, resets, and readings without delay.
 
 #![allow(clippy::unwrap_used)]
 
@@ -28,8 +28,8 @@ fn a_snapshot_goes_on_to_the_bit() {
 
 #[test]
 fn reading_along_the_way_does_not_change_the_motion() {
-    // A reading takes the first half of the next step early; the motion must
-    // be the one of an unobserved run, to the bit, and one call must equal many.
+    // A reading takes the first half of the next step early. The motion must equal that of an
+    // unobserved run, to the bit, and one call must equal many.
     for xml in [
         ARM.to_owned(),
         delayed(),
@@ -132,10 +132,10 @@ fn a_copied_state_keeps_the_parameters_of_its_place() {
     simulator.set_parameters(&[0, 1], &[0.3, 0.9]).unwrap();
     simulator.copy_state(&[0], &[1]).unwrap();
     let out = roll(&mut simulator, 30, 5, &waves(30), &record);
-    // Same start, another payload: the elbows part.
+    // Same start, another payload: the elbows separate.
     assert!((out[29] - out[59]).abs() > 0.01, "{} {}", out[29], out[59]);
 
-    // With the same payload they would not have.
+    // With the same payload they stay together.
     simulator.set_parameters(&[1], &[0.3]).unwrap();
     simulator.reset(&[0, 1]).unwrap();
     roll(&mut simulator, 5, 5, &waves(5), &record);
@@ -146,8 +146,8 @@ fn a_copied_state_keeps_the_parameters_of_its_place() {
 
 #[test]
 fn a_reading_is_of_the_end_of_its_frame() {
-    // Semi-implicit Euler: after n steps of h, v = -g n h and
-    // z = z0 - g h^2 n (n + 1) / 2 exactly; a late reading is off by |v| h.
+    // Semi-implicit Euler: after n steps of h, v = -g n h and z = z0 - g h^2 n (n + 1) / 2 exactly.
+    // A late reading is off by |v| h.
     let model = load(FALLING);
     let record = recording(&model, &["place", "speed", "qpos.ball"]);
     let mut simulator = batch(&model, 1, 1, &[]);
@@ -187,7 +187,7 @@ fn a_set_state_has_unit_quaternions_and_no_memory() {
     let model = load(ARM);
     let record = recording(&model, &CHANNELS);
     let mut simulator = batch(&model, 2, 1, &[]);
-    // One of them has a past.
+    // One of them has a history.
     let mut out = vec![0.0; 25 * record.width()];
     let control = waves(25);
     let rollout = Rollout::new(&[1], 25, 5, Control::Shared(&control), &record);

@@ -1,6 +1,6 @@
 //! rapier as an engine plugin.
 //!
-//! The same code that the default features link in, behind the C ABI.
+//! It is the code that the default features link in, behind the C ABI.
 
 asid_abi::export_backend!(
     "rapier 0.36, single precision, pure Rust",

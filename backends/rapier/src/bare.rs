@@ -1,11 +1,10 @@
-//! The engine's own bare loop, to measure batches against: servos and one call
-//! of rapier's pipeline a step, in a plain loop.
+//! The engine's own bare loop, as a baseline for batches: servos and one call of rapier's pipeline
+//! a step, in a plain loop.
 //!
-//! What a simulation of a batch does besides is left out: no readings, no look at
-//! whether the state is plausible, no resistance to rolling and spinning, no
-//! corrections of link velocities and floating roots, no guard against panics.
-//! What stays is what the arm cannot stand without (its servos) and what decides
-//! which shapes meet (rapier's own hook for that).
+//! It omits what a simulation of a batch does besides: readings, the plausibility check of the
+//! state, resistance to rolling and spinning, corrections of link velocities and floating roots,
+//! and the guard against panics. It keeps the servos, without which the arm falls, and rapier's
+//! hook that decides which shapes collide.
 
 use std::sync::Arc;
 
@@ -26,7 +25,7 @@ pub struct BareScene {
     slots: Vec<ParameterSlot>,
 }
 
-/// One simulation, stepped by whoever holds it.
+/// One simulation, stepped by its owner.
 pub struct BareWorld {
     compiled: Arc<Compiled>,
     tables: Tables,
@@ -35,10 +34,10 @@ pub struct BareWorld {
 }
 
 impl BareScene {
-    /// Compiles a scene; `targets` are what [`BareScene::world`] sets.
+    /// Compiles a scene; [`BareScene::world`] sets the `targets`.
     ///
     /// # Errors
-    /// As loading the scene and resolving the targets.
+    /// As for loading the scene and resolving the targets.
     pub fn new(scene: &Scene, targets: &[Target]) -> Result<Self> {
         let compiled = Arc::new(Compiled::new(scene)?);
         let slots = targets

@@ -1,7 +1,7 @@
 //! A batch: worlds stepped side by side on a pool of threads.
 //!
-//! Each world is stepped by one thread at a time and shares nothing that
-//! changes, so results do not depend on the number of threads.
+//! Each world is stepped by one thread at a time and shares no mutable data, so results do not
+//! depend on the number of threads.
 
 use std::sync::Arc;
 
@@ -28,17 +28,17 @@ pub struct Batch {
     pool: Option<Arc<ThreadPool>>,
 }
 
-/// States in a snapshot, with the scene that they are of.
+/// States in a snapshot, with their scene.
 struct Saved {
     compiled: Arc<Compiled>,
     states: Vec<State>,
 }
 
 impl Batch {
-    /// Makes a batch, every simulation reset and with nominal parameters.
+    /// Makes a batch with every simulation reset and with nominal parameters.
     ///
     /// # Errors
-    /// Where a target is not one of the scene's, or no threads can be started.
+    /// When a target does not belong to the scene, or no threads can be started.
     pub fn new(compiled: Arc<Compiled>, config: &BatchConfig) -> Result<Self> {
         let mut columns = Vec::with_capacity(config.targets.len());
         for target in &config.targets {

@@ -28,7 +28,7 @@ use crate::{document, refusal, settings};
 
 use built::Built;
 
-/// What rapier's loader makes of a document.
+/// The robot that rapier's loader builds from a document.
 fn loaded(model: &Model, scene: &Scene) -> Result<MjcfRobot> {
     let base = scene.directory().unwrap_or(Path::new(""));
     let options = MjcfLoaderOptions {
@@ -46,7 +46,7 @@ fn loaded(model: &Model, scene: &Scene) -> Result<MjcfRobot> {
     Ok(robot)
 }
 
-/// A world with nothing in it.
+/// An empty world.
 fn empty(structure: Structure) -> State {
     State {
         bodies: RigidBodySet::new(),
@@ -139,8 +139,8 @@ impl Compiled {
         compiled.prepare(&groups)
     }
 
-    /// Sets what the loader leaves at a game's defaults; `groups` are the contact
-    /// bits of each geom.
+    /// Sets what the loader leaves at a game's defaults; `groups` are the contact bits of each
+    /// geom.
     fn prepare(mut self, groups: &[InteractionGroups]) -> Result<Self> {
         let State {
             bodies,

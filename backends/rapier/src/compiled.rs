@@ -1,4 +1,4 @@
-//! A compiled scene: rapier's collections, with the places of everything.
+//! A compiled scene: rapier's collections, with the handles and indices of all elements.
 
 use asid_core::layout::Layout;
 use rapier3d::dynamics::{IntegrationParameters, MassProperties, RigidBody, RigidBodyHandle};
@@ -16,23 +16,23 @@ use crate::tables::Tables;
 pub struct Compiled {
     /// Name of the scene, for messages.
     pub scene: String,
-    /// Names and places.
+    /// Names and indices.
     pub layout: Layout,
     /// Contact rules.
     pub pairs: PairTable,
-    /// How masses come about.
+    /// How masses are determined.
     pub masses: MassModel,
-    /// The world as built, no step taken.
+    /// The world as built, before any step.
     pub pristine: State,
-    /// Rigid body of each body; `None` for a world that nothing refers to.
+    /// Rigid body of each body; `None` for a world to which nothing refers.
     pub bodies: Vec<Option<RigidBodyHandle>>,
     /// Whether each body is a moving link of an articulated tree.
     pub links: Vec<bool>,
-    /// Whether each body is in an articulated tree at all, be it as its fixed root.
+    /// Whether each body belongs to an articulated tree, including fixed roots.
     pub trees: Vec<bool>,
     /// The moving links with shapes that can touch something.
     pub touching_links: Vec<usize>,
-    /// Free bodies that carry joints: roots of trees that float.
+    /// Free bodies that carry joints: the roots of floating trees.
     pub floating: Vec<usize>,
     /// Body of each geom.
     pub body_of_geom: Vec<usize>,
@@ -46,7 +46,7 @@ pub struct Compiled {
     pub actuators: Vec<ActuatorSlot>,
     /// Sensors, in the order of the layout.
     pub sensors: Vec<SensorSlot>,
-    /// Parameters as the document has them.
+    /// Parameters as in the document.
     pub nominal: Tables,
     /// Solver settings.
     pub integration: IntegrationParameters,
@@ -62,7 +62,7 @@ pub fn set_inertia(body: &mut RigidBody, colliders: &ColliderSet, inertia: &Iner
         convert::to_vector(&inertia.moments),
         convert::to_rotation(&inertia.axes),
     );
-    // A body with equal moments has no gyroscopic torque, only rapier's rounding of it.
+    // A body with equal moments has no gyroscopic torque; rapier would add its rounding error.
     let [a, b, c] = inertia.moments.into();
     let spread = (a - b).abs().max((b - c).abs());
     body.enable_gyroscopic_forces(spread > 1e-6 * inertia.moments.amax());

@@ -1,14 +1,13 @@
-//! Forces of contacts: the normal force that is recorded, and the resistance to
-//! rolling and spinning that rapier lacks.
+//! Forces of contacts: the recorded normal force, and the resistance to rolling and spinning that
+//! rapier lacks.
 //!
-//! A pair with `condim` 4 or 6 resists spinning about its normal with at most
-//! `friction[1] * N`, one with 6 also rolling with at most `friction[2] * N` (N m,
-//! for a normal force N). It is applied as a pair of torques in the following
-//! step, from this step's normal force: proportional to the relative angular
-//! velocity up to what would just stop it, with a slow integral part so that a body
-//! at rest on a slope stays there without creeping, and the whole clamped to its bound. The
-//! bounds of sliding, spinning and rolling are independent, where MuJoCo's
-//! elliptic cone joins them.
+//! A pair with `condim` 4 or 6 resists spinning about its normal with at most `friction[1] * N`;
+//! one with 6 also resists rolling with at most `friction[2] * N` (N m, for a normal force N). The
+//! resistance is applied as a pair of torques in the following step, from this step's normal force.
+//! It is proportional to the relative angular velocity, up to the torque that just stops it. A slow
+//! integral part keeps a body at rest on a slope without creeping. The whole is clamped to its
+//! bound. The bounds of sliding, spinning and rolling are independent, whereas MuJoCo's elliptic
+//! cone couples them.
 
 use rapier3d::dynamics::RigidBody;
 use rapier3d::geometry::{ColliderSet, ContactPair, NarrowPhase};
@@ -17,10 +16,10 @@ use rapier3d::utils::AngularInertiaOps;
 
 use crate::pairs::{Friction, PairTable};
 
-/// Part of a relative angular velocity that one step takes out.
+/// Fraction of a relative angular velocity that one step removes.
 const STOPPING: f32 = 0.7;
 
-/// Part of a relative angular velocity whose stopping torque is remembered.
+/// Fraction of a relative angular velocity whose stopping torque is remembered.
 const HOLDING: f32 = 0.1;
 
 /// Normal force between the geoms of two bodies in the last step, N.
@@ -49,7 +48,7 @@ pub fn normal_force(
     impulse / dt
 }
 
-/// What the resistance of contacts is computed from.
+/// Inputs of the contacts' resistance.
 pub struct Touching<'a> {
     /// Contacts with the impulses of the last step.
     pub narrow_phase: &'a NarrowPhase,
@@ -61,24 +60,25 @@ pub struct Touching<'a> {
     pub body: &'a dyn Fn(usize) -> Option<&'a RigidBody>,
 }
 
-/// Torque that the resistance of one contact remembers, and where it acts.
+/// Torque remembered by one contact, and where it acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Held {
     pair: (u32, u32),
     torque: Vector,
 }
 
-/// What resists rolling and spinning, from step to step.
+/// Resistance to rolling and spinning, kept from step to step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Resistance {
     held: Vec<Held>,
-    /// Those of the step before; kept for its memory.
+    /// The torques of the step before, kept to reuse the memory.
     before: Vec<Held>,
 }
 
 impl Resistance {
-    /// Adds to `torques` what the contacts of the last step let act in the coming
-    /// one: geom's body (index in the layout) and torque in the world frame, N m.
+    /// Adds to `torques` the contact torques of the coming step, from the contacts of the last one.
+    ///
+    /// Each entry is the geom's body (index in the layout) and the torque in the world frame, N m.
     pub fn torques(
         &mut self,
         table: &PairTable,
@@ -148,7 +148,7 @@ fn pressing(pair: &ContactPair, dt: f32) -> (f32, Vector) {
     (load, normal.normalize_or_zero())
 }
 
-/// A contact whose bodies turn against each other.
+/// A contact whose bodies rotate relative to each other.
 struct Turning {
     /// Direction of the normal force.
     normal: Vector,
@@ -156,13 +156,15 @@ struct Turning {
     relative: Vector,
     /// Largest torques against spinning and against rolling, N m.
     bounds: [f32; 2],
-    /// Torque that is remembered, N m.
+    /// Remembered torque, N m.
     held: Vector,
 }
 
 impl Turning {
-    /// The law of one contact: the torques on the second body against spinning and against rolling, and the torque
-    /// to remember, N m. `inverse_inertia` is that of both bodies together about an axis, 1/(kg m²).
+    /// Computes one contact: the torques on the second body against spinning and against rolling,
+    /// and the torque to remember, N m.
+    ///
+    /// `inverse_inertia` is that of both bodies together about an axis, 1/(kg m²).
     fn resist(&self, inverse_inertia: impl Fn(Vector) -> f32, dt: f32) -> ([Vector; 2], Vector) {
         let spin = self.normal * self.relative.dot(self.normal);
         let twist = self.normal * self.held.dot(self.normal);

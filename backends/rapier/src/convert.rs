@@ -1,4 +1,4 @@
-//! Between rapier's single precision and the `f64` of the interface.
+//! Conversions between rapier's single precision and the `f64` of the interface.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rapier3d::math::{Pose, Rotation, Vector};
@@ -33,8 +33,7 @@ pub fn to_pose(position: &Vector3<f64>, orientation: &UnitQuaternion<f64>) -> Po
     Pose::from_parts(to_vector(position), to_rotation(orientation))
 }
 
-/// The rotation of four entries w x y z; the identity where they are all zero,
-/// as MuJoCo has it.
+/// The rotation of four entries w x y z; as in MuJoCo, the identity if all are zero.
 pub fn quaternion(wxyz: &[f64]) -> UnitQuaternion<f64> {
     let q = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
     if q.norm() < 1e-15 {

@@ -1,9 +1,9 @@
-//! Generalised coordinates: MuJoCo's `qpos` and `qvel` from and into a state.
+//! Generalised coordinates: reads MuJoCo's `qpos` and `qvel` from a state and sets them.
 //!
-//! rapier keeps a free body's velocity at its centre of mass and in the world
-//! frame, a ball joint's rate in the parent's frame, and a hinge's angle from
-//! its own zero; the layout wants the velocity of the body's origin with the
-//! rate in the body's frame, a ball's rate in the child's frame, and MJCF `ref`.
+//! rapier stores a free body's velocity at its centre of mass and in the world frame, a ball
+//! joint's rate in the parent's frame, and a hinge's angle from its own zero. The layout requires
+//! the velocity of the body's origin with the rate in the body's frame, a ball's rate in the
+//! child's frame, and MJCF `ref`.
 
 use asid_core::layout::JointKind;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -35,7 +35,7 @@ impl State {
         joint.handle.and_then(|h| self.multibodies.get(h))
     }
 
-    /// Coordinate and velocity of a hinge or slide, `ref` included.
+    /// Coordinate and velocity of a hinge or slide, including `ref`.
     pub fn scalar(&self, joint: &JointSlot) -> (f64, f64) {
         let Some((multibody, id)) = self.link(joint) else {
             return (0.0, 0.0);
@@ -66,7 +66,7 @@ impl State {
             convert::vector(rigid.linvel()),
             convert::vector(rigid.angvel()),
         );
-        // What rapier keeps for a link is that of an earlier substep.
+        // rapier's stored values of a link are those of an earlier substep.
         if let Some(link) = self.multibodies.rigid_body_link(handle)
             && let Some(multibody) = self.multibodies.get_multibody(link.multibody)
         {
@@ -86,8 +86,8 @@ impl State {
         }
     }
 
-    /// Gives the bodies of links that can touch something their present velocity:
-    /// rapier leaves there what they had one substep earlier, and contacts see it.
+    /// Updates the velocity of links that can touch something: rapier leaves the one of the
+    /// previous substep, and contacts use it.
     pub fn refresh_link_velocities(&mut self, compiled: &Compiled) {
         for &body in &compiled.touching_links {
             let motion = self.motion(compiled, body);
@@ -98,15 +98,17 @@ impl State {
         }
     }
 
-    /// Orientation of the root of a tree that floats.
+    /// Orientation of the root of a floating tree.
     pub fn root_rotation(&self, compiled: &Compiled, body: usize) -> Rotation {
         self.body(compiled, body)
             .map_or(Rotation::IDENTITY, |b| b.position().rotation)
     }
 
-    /// Puts the root of a tree that floats where it belongs after a step in which
-    /// it turned from `before`. rapier moves a root's origin with the velocity of
-    /// its centre of mass, as if the centre were at the origin.
+    /// Corrects the position of a floating tree's root after a step in which it turned from
+    /// `before`.
+    ///
+    /// rapier moves a root's origin with the velocity of its centre of mass, as if the centre were
+    /// at the origin.
     pub fn correct_root(&mut self, compiled: &Compiled, body: usize, before: Rotation) {
         let Some(handle) = compiled.bodies[body] else {
             return;
@@ -164,7 +166,7 @@ impl State {
         (rotation, rotation.inverse() * rate)
     }
 
-    /// Sets `qpos` and `qvel` of a state that has no history: the pristine one.
+    /// Sets `qpos` and `qvel` of a state without a history: the pristine one.
     pub fn set_coordinates(&mut self, compiled: &Compiled, qpos: &[f64], qvel: &[f64]) {
         for joint in &compiled.joints {
             let q = &qpos[joint.qpos..joint.qpos + joint.kind.qpos_len()];
@@ -234,7 +236,8 @@ impl State {
         }
     }
 
-    /// Rebuilds masses, places of geoms, and places and axes of joints where they differ from `tables`.
+    /// Rebuilds masses, positions of geoms, and positions and axes of joints where they differ from
+    /// `tables`.
     pub fn rebuild(&mut self, compiled: &Compiled, tables: &Tables) {
         let wanted = &tables.structure;
         if self.structure == *wanted {
@@ -267,7 +270,7 @@ impl State {
             let Some(rigid) = self.bodies.get_mut(handle) else {
                 continue;
             };
-            // The velocity of the body's origin stays, so that of its centre follows it.
+            // The velocity of the body's origin stays the same, so that of its centre follows it.
             let before = rigid.center_of_mass();
             set_inertia(rigid, &self.colliders, &inertia);
             let shift = rigid.center_of_mass() - before;
@@ -290,7 +293,8 @@ impl State {
         self.structure = wanted.clone();
     }
 
-    /// Moves and turns joints' axes within their bodies, and bodies in their parents; the joints' coordinates stay.
+    /// Moves joints' anchors and axes within their bodies, and bodies in their parents; the joints'
+    /// coordinates stay.
     fn place_joints(&mut self, compiled: &Compiled, wanted: &Structure) {
         for (i, joint) in compiled.joints.iter().enumerate() {
             let (is, body) = (&self.structure, joint.body);
@@ -309,7 +313,7 @@ impl State {
                     &mut link.joint.data.local_frame1,
                     link.joint.data.local_frame2,
                 );
-                // With the joint at zero both frames are one place.
+                // With the joint at zero, both frames coincide.
                 let parent_from_child = parent.rotation * child.rotation.inverse();
                 let mut own = child;
                 own.translation = convert::to_vector(&anchor);
@@ -355,7 +359,7 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Velocity of the point of the body that is at `point`, m/s.
+    /// Velocity of the body's point at `point`, m/s.
     pub fn velocity_at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.linear + self.angular.cross(&(point - self.center))
     }

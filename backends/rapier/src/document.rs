@@ -1,5 +1,4 @@
-//! What of the document is prepared for rapier's loader, and what the loader must
-//! not see because this crate does it itself.
+//! Prepares the document for rapier's loader, and hides from it what this crate does itself.
 
 use asid_core::layout::Layout;
 use asid_core::{Result, Scene};
@@ -13,8 +12,8 @@ use rapier3d_mjcf::{MjcfBody, MjcfRobot};
 use crate::convert;
 use crate::slot::{ActuatorSlot, Frame};
 
-/// Contact bits of each geom; geoms of an explicit pair pass them all, and the
-/// table of pairs decides.
+/// Contact bits of each geom. Geoms of an explicit pair pass them all, and the table of pairs
+/// decides.
 pub fn groups(model: &Model) -> Vec<InteractionGroups> {
     let paired: Vec<&str> = model
         .contact
@@ -36,10 +35,11 @@ pub fn groups(model: &Model) -> Vec<InteractionGroups> {
         .collect()
 }
 
-/// Roots each tree that stands on the world in a fixed body of its own. On the
-/// world's body all trees would be one, with one large mass matrix, and what lies
-/// on the floor would be solved as if it touched a link. Trees stay together
-/// where an equality couples joints, which must then be in one tree.
+/// Gives each tree that stands on the world a fixed root body of its own.
+///
+/// With the world's body as a common root, all trees would form one tree with one large mass
+/// matrix. Objects on the floor would then be solved as if they touched a link. Trees whose joints
+/// are coupled by an equality must be in one tree and stay together.
 pub fn give_roots(robot: &mut MjcfRobot) {
     let together = !robot.joint_couplings.is_empty();
     let mut root = None;
@@ -68,7 +68,7 @@ pub fn give_roots(robot: &mut MjcfRobot) {
     }
 }
 
-/// Frame of every geom in its body, `fromto` resolved.
+/// Frame of every geom in its body, with `fromto` resolved.
 pub fn geom_frames(model: &Model) -> Vec<Frame> {
     let mut frames = Vec::new();
     for (body, entry) in model.bodies.iter().enumerate() {
@@ -90,7 +90,7 @@ pub fn geom_frames(model: &Model) -> Vec<Frame> {
 /// Actuators with their joints and limits.
 ///
 /// # Errors
-/// When one names a joint that is not there.
+/// When one names a joint that does not exist.
 pub fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
     let mut slots = Vec::with_capacity(model.actuators.len());
     for (actuator, place) in model.actuators.iter().zip(&layout.actuators) {
@@ -113,8 +113,8 @@ pub fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
     Ok(slots)
 }
 
-/// Puts right what the parser takes for something else: the friction of a `<pair>` has
-/// two sliding and two rolling entries, and an equality may name the world.
+/// Corrects what the parser misreads: the friction of a `<pair>` has two sliding and two rolling
+/// entries, and an equality may name the world.
 ///
 /// # Errors
 /// A pair whose friction differs by direction, or is left to a default class.
@@ -157,10 +157,10 @@ pub fn correct(scene: &Scene, model: &mut Model) -> std::result::Result<(), Stri
     Ok(())
 }
 
-/// Checks that equalities name bodies and joints that are there.
+/// Checks that equalities name existing bodies and joints.
 ///
 /// # Errors
-/// What is not there.
+/// The missing name.
 pub fn check_equalities(model: &Model) -> std::result::Result<(), String> {
     let body = |name: &str| {
         model.body_id_by_name(name).map(|_| ()).ok_or(format!(
@@ -192,25 +192,24 @@ pub fn check_equalities(model: &Model) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// Names that the loader sees. The loader finds things by name and skips what
-/// has none, so every geom and joint gets a name of its own.
+/// Names that the loader sees. The loader finds elements by name and skips unnamed ones, so every
+/// geom and joint gets a unique name.
 pub struct Places;
 
 impl Places {
-    /// That of a geom.
+    /// Name of a geom.
     pub fn geom(&self, index: usize) -> String {
         format!("\u{1}geom{index}")
     }
 
-    /// That of a joint.
+    /// Name of a joint.
     pub fn joint(&self, index: usize) -> String {
         format!("\u{1}joint{index}")
     }
 }
 
-/// Gives every geom and joint its name for the loader, and takes away what this
-/// backend does itself: actuators, sensors, keyframes, contact filters, and
-/// springs, damping and friction of joints.
+/// Gives every geom and joint its name for the loader, and removes what this backend does itself:
+/// actuators, sensors, keyframes, contact filters, and springs, damping and friction of joints.
 pub fn rename(model: &mut Model) -> Places {
     let places = Places;
     let paired: Vec<String> = (model.contact.pairs.iter())
@@ -220,7 +219,7 @@ pub fn rename(model: &mut Model) -> Places {
     let mut new_names = Vec::new();
     for entry in &mut model.bodies {
         for geom in &mut entry.body.geoms {
-            // What touches by an explicit pair alone has a shape all the same.
+            // A geom that touches only by an explicit pair needs a shape too.
             if geom.name.as_ref().is_some_and(|n| paired.contains(n)) && geom.conaffinity == 0 {
                 geom.contype = geom.contype.max(1);
             }
@@ -249,8 +248,8 @@ pub fn rename(model: &mut Model) -> Places {
         if let Equality::Joint(joint) = equality {
             joint.joint1 = renamed(&joint.joint1);
             joint.joint2 = joint.joint2.as_deref().map(renamed);
-            // The loader takes the second joint for the function of the first;
-            // in MJCF the first is the function of the second.
+            // The loader takes the second joint as a function of the first; in MJCF the first is a
+            // function of the second.
             if let Some(second) = joint.joint2.as_mut() {
                 std::mem::swap(&mut joint.joint1, second);
             }

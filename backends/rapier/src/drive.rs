@@ -1,16 +1,15 @@
 //! Drives, springs, dampers and rotor inertias of hinges and slides.
 //!
-//! All that is linear in a joint's position and velocity goes into one implicit
-//! spring and damper of the multibody: servo gains, passive springs and damping.
-//! rapier adds them to the mass matrix, so that stiff gains are stable and the
-//! coupled joints are solved exactly, which its motor constraints, solved one by
-//! one, are not. What is constant over the step shifts the spring's rest.
+//! All forces linear in a joint's position and velocity form one implicit spring and damper of the
+//! multibody: servo gains, passive springs and damping. rapier adds them to the mass matrix. Stiff
+//! gains are therefore stable, and the coupled joints are solved exactly, unlike with its motor
+//! constraints, which it solves one by one. A force that is constant over the step shifts the
+//! spring's rest position.
 //!
-//! A servo at its force limit is a constant force. As in MuJoCo the force is
-//! clamped by what the state at the start of the step asks for; but a servo with
-//! a strong damper is held to be at its limit only if the force that it would
-//! reach at the end of the step is beyond it too, since otherwise it would
-//! flicker between its limits from one step to the next.
+//! A servo at its force limit is a constant force. As in MuJoCo, the force demanded by the state at
+//! the start of the step is clamped. A servo with a strong damper counts as saturated only if the
+//! force that it would reach at the end of the step is beyond the limit too. Otherwise it would
+//! switch between its limits from one step to the next.
 
 use asid_core::layout::JointKind;
 use mjcf_rs::extras::ActuatorKind;
@@ -21,8 +20,8 @@ use crate::slot::{ActuatorSlot, JointSlot};
 use crate::state::State;
 use crate::tables::{ActuatorValues, Tables};
 
-/// Stiffness that carries a constant force where a joint has no spring: the
-/// rest is put far away. Too soft to matter, stiff enough for single precision.
+/// Stiffness that carries a constant force where a joint has no spring, with a far-away rest
+/// position. It is too soft to matter and stiff enough for single precision.
 const CARRIER: f64 = 1e-3;
 
 /// Force of a joint as `constant + rest_force - stiffness q - damping v`.
@@ -75,8 +74,9 @@ fn actuator(slot: &ActuatorSlot, values: &ActuatorValues, ctrl: f64) -> Linear {
 }
 
 impl State {
-    /// Sets the joint forces of the coming step: `ctrl` is `nu`, `force` the
-    /// generalised force to add, `nv` or empty.
+    /// Sets the joint forces of the coming step.
+    ///
+    /// `ctrl` is `nu`; `force` is the generalised force to add, `nv` or empty.
     pub fn drive(&mut self, compiled: &Compiled, tables: &Tables, ctrl: &[f64], force: &[f64]) {
         let dt = compiled.layout.timestep;
         for (index, joint) in compiled.joints.iter().enumerate() {
@@ -126,7 +126,7 @@ impl State {
         }
     }
 
-    /// Inverse inertia that a joint's force meets, all other joints free.
+    /// Inverse inertia seen by a joint's force, with all other joints free.
     fn inverse_inertia(&mut self, joint: &JointSlot) -> f64 {
         let Some((multibody, id)) = joint.handle.and_then(|h| self.multibodies.get_mut(h)) else {
             return 0.0;

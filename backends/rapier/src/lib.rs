@@ -102,7 +102,7 @@ use crate::batch::Batch;
 use crate::compiled::Compiled;
 use crate::parameter::ParameterSlot;
 
-/// Version of the rapier that this crate is built against.
+/// Version of rapier that this crate is built against.
 const VERSION: &str = "0.36";
 
 /// The engine.

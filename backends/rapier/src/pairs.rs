@@ -1,8 +1,8 @@
 //! Which pairs of geoms can collide, and the friction of each pair.
 //!
-//! The rules are MuJoCo's: contact bits in either direction, excluded and explicit
-//! pairs, no contact between a body and its parent; the elementwise larger
-//! friction, or that of the geom with the higher priority.
+//! The rules are MuJoCo's. They comprise contact bits in either direction, excluded and explicit
+//! pairs, and no contact between a body and its parent. The friction is the elementwise larger one,
+//! or that of the geom with the higher priority.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,20 +12,20 @@ use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsH
 
 use crate::slip::Sides;
 
-/// Bit of a contact's index by which rapier marks it as new.
+/// Bit of a contact's index with which rapier marks it as new.
 const NEW_CONTACT: u32 = 1 << 31;
 
 /// Friction of one geom: sliding, torsional (m), rolling (m).
 pub type Friction = [f32; 3];
 
-/// Which geom of a pair rules its friction.
+/// Which geom of a pair determines its friction.
 #[derive(Clone, Copy, Debug)]
 enum Ruling {
     /// The first one: it has the higher priority.
     First,
     /// The second one: it has the higher priority.
     Second,
-    /// Both, by the elementwise larger friction: their priorities are equal.
+    /// Both, by the elementwise larger friction, since their priorities are equal.
     Both,
 }
 
@@ -35,11 +35,11 @@ struct Pair {
     may_collide: bool,
     condim: u32,
     ruling: Ruling,
-    /// Friction of an explicit `<pair>`, which overrules that of both geoms.
+    /// Friction of an explicit `<pair>`, which overrides that of both geoms.
     own: Option<Friction>,
 }
 
-/// What leaves the friction of a geom without effect.
+/// What makes the friction of a geom irrelevant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overruled {
     /// The friction of an explicit `<pair>` with this geom.
@@ -56,7 +56,7 @@ struct Rules {
     priority: i32,
     condim: u32,
     body: usize,
-    /// Body that this geom's is rigidly joined to, and the one that it moves on.
+    /// The body that the geom's body is rigidly joined to, and the one that this body moves on.
     group: usize,
     parent_group: usize,
 }
@@ -68,11 +68,14 @@ struct Explicit {
     friction: Option<Friction>,
 }
 
-/// The rules for every pair of geoms. They are kept by geom: pairs of a document of thousands of geoms fill the memory.
+/// The rules for every pair of geoms.
+///
+/// They are stored by geom, because the pairs of a document with thousands of geoms would fill the
+/// memory.
 #[derive(Clone, Debug)]
 pub struct PairTable {
     geoms: Vec<Rules>,
-    /// Pairs of bodies that are excluded, in both orders.
+    /// Excluded pairs of bodies, in both orders.
     excluded: BTreeSet<(usize, usize)>,
     /// Explicit pairs of geoms, in both orders.
     explicit: BTreeMap<(usize, usize), Explicit>,
@@ -80,12 +83,14 @@ pub struct PairTable {
 }
 
 impl PairTable {
-    /// Reads the rules of a document: contact bits, excluded and explicit pairs,
-    /// and MuJoCo's rule that a body does not collide with its parent (unless the world)
-    /// or what it is welded to.
+    /// Reads the rules of a document: contact bits, excluded and explicit pairs, and MuJoCo's rule
+    /// on parents.
+    ///
+    /// By that rule, a body does not collide with its parent (unless the world) or with what it is
+    /// welded to.
     ///
     /// # Errors
-    /// The name of a body or geom that a contact element refers to in vain.
+    /// The name of a body or geom that a contact element refers to, but that does not exist.
     pub fn new(model: &Model, body_of: &[usize]) -> Result<Self, String> {
         let geoms: Vec<_> = model.bodies.iter().flat_map(|b| &b.body.geoms).collect();
         let welded = weld_groups(model);
@@ -136,7 +141,8 @@ impl PairTable {
         Ok(table)
     }
 
-    /// Whether a pair that can collide resists rolling or spinning: it is explicit, or one of its geoms asks for that.
+    /// Whether a pair that can collide resists rolling or spinning: it is explicit, or one of its
+    /// geoms has such friction.
     fn some_pair_turns(&self) -> bool {
         let turns = |(a, b): (usize, usize)| {
             let pair = self.pair(a, b);
@@ -169,13 +175,14 @@ impl PairTable {
         }
     }
 
-    /// True where some pair resists rolling or spinning.
+    /// Whether some pair resists rolling or spinning.
     pub fn has_rolling_or_spinning_friction(&self) -> bool {
         self.has_rolling_or_spinning_friction
     }
 
-    /// What overrules the friction of a geom in all the contacts that it can make; `None` where it counts in some, or
-    /// where the geom can touch nothing.
+    /// What overrules the friction of a geom in all contacts that it can make.
+    ///
+    /// `None` where its friction counts in some contact, or where the geom can touch nothing.
     pub fn overruled(&self, geom: usize) -> Option<Overruled> {
         let mut by = None;
         let touched = (0..self.geoms.len()).filter(|&other| self.pair(geom, other).may_collide);
@@ -217,8 +224,8 @@ fn weld_groups(model: &Model) -> Vec<usize> {
     groups
 }
 
-/// Hooks that rapier calls for every pair of near shapes; a collider's
-/// `user_data` is its geom's index.
+/// Hooks that rapier calls for every pair of near shapes; a collider's `user_data` is its geom's
+/// index.
 pub struct Hooks<'a> {
     /// Rules.
     pub table: &'a PairTable,
@@ -228,7 +235,7 @@ pub struct Hooks<'a> {
     pub body_of: &'a [usize],
     /// Whether each body is a moving link of an articulated tree.
     pub links: &'a [bool],
-    /// Whether each body is in an articulated tree at all.
+    /// Whether each body belongs to an articulated tree, including fixed roots.
     pub trees: &'a [bool],
 }
 
@@ -271,7 +278,7 @@ impl PhysicsHooks for Hooks<'_> {
 mod tests {
     use super::*;
 
-    /// As pairs they would be 9e8, in 20 GB.
+    /// Stored as pairs, they would be 9e8 entries in 20 GB.
     #[test]
     fn a_document_of_many_geoms_takes_no_memory_for_each_pair() {
         let geoms = r#"<geom size="0.1"/>"#.repeat(30_000);

@@ -1,4 +1,4 @@
-//! Parameters: what a target is in this engine ([`resolve`]), its value, and setting it.
+//! Parameters: a target resolved in this engine ([`resolve`]), and how its value is read and set.
 
 mod resolve;
 
@@ -101,7 +101,7 @@ impl ParameterSlot {
         }
     }
 
-    /// True where the value may change from step to step.
+    /// Whether the value may change from step to step.
     pub fn is_live(self) -> bool {
         matches!(
             self,
@@ -109,7 +109,7 @@ impl ParameterSlot {
         )
     }
 
-    /// True where the value lives in rapier's bodies and shapes.
+    /// Whether the value is stored in rapier's bodies and shapes.
     pub fn is_structural(self) -> bool {
         matches!(
             self,

@@ -1,7 +1,7 @@
-//! Threads for batches: one pool for each number of threads, made once.
+//! Thread pools for batches: one pool for each number of threads, made once.
 //!
-//! Algorithms make and drop batches by the hundred, and starting threads takes longer than many
-//! a small batch runs. A pool outlives its batches; batches that run at the same time share it.
+//! Algorithms make and drop batches by the hundred, and starting threads takes longer than many a
+//! small batch runs. A pool outlives its batches; simultaneous batches share it.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,10 +11,10 @@ use rayon::ThreadPool;
 
 static POOLS: Mutex<BTreeMap<usize, Arc<ThreadPool>>> = Mutex::new(BTreeMap::new());
 
-/// The pool of so many threads.
+/// The pool with this many threads.
 ///
 /// # Errors
-/// Where they cannot be started.
+/// When they cannot be started.
 pub fn of(threads: usize) -> Result<Arc<ThreadPool>> {
     let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(pool) = pools.get(&threads) {
@@ -42,7 +42,8 @@ mod tests {
         assert!(!Arc::ptr_eq(&two, &of(3).unwrap()));
     }
 
-    /// Printed, as times depend on the machine: `cargo test -p asid-rapier pool -- --nocapture`.
+    /// The times are printed because they depend on the machine: `cargo test -p asid-rapier pool --
+    /// --nocapture`.
     #[test]
     fn a_pool_that_is_there_costs_less_than_a_new_one() {
         const TIMES: u32 = 50;

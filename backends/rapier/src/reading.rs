@@ -1,4 +1,4 @@
-//! What sensors read of a state.
+//! Readings of the sensors in a state.
 
 use asid_core::layout::JointKind;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -9,7 +9,7 @@ use crate::sensor::{Reading, SensorSlot};
 use crate::state::State;
 
 impl SensorSlot {
-    /// Reads it into `out`, as long as the sensor is.
+    /// Reads it into `out`, which has the sensor's length.
     pub fn read(&self, state: &State, compiled: &Compiled, out: &mut [f64]) {
         match self {
             Self::Frame(reading, frame) => {
@@ -50,7 +50,7 @@ impl SensorSlot {
     }
 }
 
-/// Reads a frame that is fixed to a moving body: `position` and `rotation` are in the body's frame.
+/// Reads a frame that is fixed to a moving body; `position` and `rotation` are in the body's frame.
 fn read_at(
     reading: Reading,
     motion: &Motion,

@@ -1,10 +1,9 @@
-//! What this backend cannot simulate, found in the document before the loader sees it.
+//! Finds what this backend cannot simulate, in the document and before the loader reads it.
 //!
-//! Loaders skip what they do not know. A part of a scene that changes the
-//! physics must not be skipped in silence, so it is looked for by name here and
-//! refused with one line. Settings of another engine's solver (`solref`,
-//! `solimp`, `impratio`, integrators) are not physics of the scene and pass,
-//! but for a contact so little damped that it throws bodies back.
+//! Loaders skip what they do not know. A part that changes the physics must not be skipped
+//! silently, so this module looks for it by name and refuses it with one line. Settings of another
+//! engine's solver (`solref`, `solimp`, `impratio`, integrators) are not physics of the scene and
+//! pass. The exception is a contact whose damping is so low that it makes bodies bounce.
 
 use std::collections::HashSet;
 
@@ -61,7 +60,7 @@ fn refuse(scene: &Scene, message: String) -> Error {
     }
 }
 
-/// Refuses a document with parts that this backend would leave out.
+/// Refuses a document with parts that this backend would omit.
 ///
 /// # Errors
 /// [`Error::Scene`], naming the first such part and its line.
@@ -85,7 +84,7 @@ pub fn check(scene: &Scene, model: &Model) -> Result<()> {
     Ok(())
 }
 
-/// What a name must be unique among; `None` where names are not looked up.
+/// The kind within which a name must be unique; `None` where names are not looked up.
 fn named_kind(node: &Node<'_, '_>) -> Option<&'static str> {
     let within = |tag: &str| node.ancestors().skip(1).any(|a| a.has_tag_name(tag));
     match node.tag_name().name() {
@@ -179,7 +178,7 @@ fn check_document(scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-/// Flags of MuJoCo's solver, which say nothing of the physics.
+/// Flags of MuJoCo's solver, which do not affect the physics.
 const SOLVER: [&str; 14] = [
     "warmstart",
     "filterparent",
@@ -197,7 +196,7 @@ const SOLVER: [&str; 14] = [
     "sleep",
 ];
 
-/// The flag of a `<flag>` that switches physics off that this backend always has.
+/// The flag of a `<flag>` that disables physics which this backend always has.
 fn refused_flag<'a>(node: &Node<'a, '_>) -> Option<&'a str> {
     let refused = node.attributes().find(|attribute| {
         let disables = attribute.value() == "disable" || attribute.name() == "override";
@@ -207,13 +206,15 @@ fn refused_flag<'a>(node: &Node<'a, '_>) -> Option<&'a str> {
     refused.map(|attribute| attribute.name())
 }
 
-/// Share of its speed with which a body leaves a contact of this `solref`, from which on it is
-/// refused: rapier's contacts throw nothing back.
+/// A contact is refused if its `solref` returns more than this share of the impact speed, because
+/// rapier's contacts do not bounce.
 const BOUNCE: f64 = 0.1;
 
-/// Coefficient of restitution of an impact on a spring and damper, `exp(-pi z / sqrt(1 - z^2))` with
-/// the damping ratio `z`. `solref` holds time constant and damping ratio, or, negative, stiffness
-/// and damping for a unit of mass, of which `z = damping / (2 sqrt(stiffness))`.
+/// Coefficient of restitution of an impact on a spring and damper, `exp(-pi z / sqrt(1 - z^2))`
+/// with the damping ratio `z`.
+///
+/// `solref` holds the time constant and the damping ratio. If negative, it holds stiffness and
+/// damping for a unit of mass, so that `z = damping / (2 sqrt(stiffness))`.
 fn restitution(solref: &str) -> Option<f64> {
     let mut numbers = solref.split_whitespace().map(str::parse::<f64>);
     let (first, second) = (numbers.next()?.ok()?, numbers.next()?.ok()?);

@@ -1,7 +1,7 @@
 //! Sensors, with MuJoCo's meaning.
 //!
-//! `objtype="body"` is the frame of the body's inertia, with its origin in the
-//! centre of mass, and `xbody` the frame of the body itself, as in MuJoCo.
+//! As in MuJoCo, `objtype="body"` is the frame of the body's inertia, with its origin in the centre
+//! of mass, and `xbody` is the frame of the body itself.
 
 use asid_core::layout::Layout;
 use asid_core::{Error, Result};
@@ -11,7 +11,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use crate::convert;
 use crate::slot::Frame;
 
-/// What is read of a frame.
+/// Quantity that is read of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
     /// Position in the world, m.
@@ -30,10 +30,10 @@ pub enum Reading {
     OwnRate,
 }
 
-/// A sensor's place in the scene.
+/// A sensor resolved in the scene.
 #[derive(Clone, Debug)]
 pub enum SensorSlot {
-    /// Of a place fixed in a body.
+    /// Of a frame fixed in a body.
     Frame(Reading, Frame),
     /// Of a geom, which a parameter may move.
     Geom(Reading, usize),
@@ -45,7 +45,7 @@ pub enum SensorSlot {
     JointVelocity(usize),
     /// Simulated time, s.
     Clock,
-    /// One that this engine cannot read, with the reason.
+    /// A sensor that this engine cannot read, with the reason.
     Unread(String),
 }
 

@@ -1,34 +1,35 @@
-//! Sliding friction against the direction of slip.
+//! Makes sliding friction act against the direction of slip.
 //!
-//! rapier solves a contact point's two tangential directions together, with the
-//! inverse inertia `K` that the point feels, and then shortens the impulse to
-//! `mu N`. While a point slides the impulse therefore settles along `K^-1 v` and
-//! not along the slip `v`, and since a body turns more easily about some axes
-//! than others the two can be 30 degrees apart: a box then slides 8 % too far, a
-//! rod much more. A contact's target slip, which rapier has for conveyor belts,
-//! takes the error out: with the target `v - c K v` the impulse settles along `v`.
-//! `c` is one over the largest inertia, so that a point that sticks is brought
-//! to rest without overshoot, and one at rest is left alone.
+//! rapier solves a contact point's two tangential directions together, with the inverse inertia `K`
+//! at the point, and then shortens the impulse to `mu N`. While a point slides, the impulse
+//! therefore settles along `K^-1 v` and not along the slip `v`. A body turns more easily about some
+//! axes than others, so the two can be 30 degrees apart. A box then slides 8 % too far, a rod much
+//! more.
+//!
+//! A contact's target slip, which rapier provides for conveyor belts, removes the error: with the
+//! target `v - c K v` the impulse settles along `v`. `c` is one over the largest inertia, so that a
+//! sticking point is stopped without overshoot. A point at rest is left alone.
 
 use rapier3d::dynamics::{RigidBody, RigidBodyHandle, RigidBodySet};
 use rapier3d::geometry::SolverContact;
 use rapier3d::math::Vector;
 use rapier3d::utils::{AngularInertiaOps, OrthonormalBasis};
 
-/// The two bodies of a contact, as far as they can be pushed.
+/// The two bodies of a contact, if they can be pushed.
 pub struct Sides<'a> {
     bodies: [Option<&'a RigidBody>; 2],
     links: [bool; 2],
-    /// True where one side is in an articulated tree: rapier then solves the two
-    /// directions apart.
+    /// Whether one side is in an articulated tree: rapier then solves the two directions
+    /// separately.
     apart: bool,
     basis: [Vector; 2],
 }
 
 impl<'a> Sides<'a> {
-    /// Bodies of a contact with the normal from the first to the second;
-    /// `links` tells which of them are moving links of articulated trees, `apart`
-    /// whether one is in such a tree at all.
+    /// Bodies of a contact with the normal from the first to the second.
+    ///
+    /// `links` says which of them are moving links of articulated trees, `apart` whether one
+    /// belongs to such a tree at all.
     pub fn new(
         bodies: &'a RigidBodySet,
         handles: [Option<RigidBodyHandle>; 2],
@@ -45,8 +46,9 @@ impl<'a> Sides<'a> {
         }
     }
 
-    /// Sets the target slip of one contact, whose anchors are world points and whose
-    /// friction gave at most the impulse `limit` (N s) in the last step.
+    /// Sets the target slip of one contact, whose anchors are world points.
+    ///
+    /// Its friction gave at most the impulse `limit` (N s) in the last step.
     pub fn align(&self, contact: &mut SolverContact, limit: f32) {
         let point = (contact.anchor1 + contact.anchor2) * 0.5;
         let mut slip = Vector::ZERO;
@@ -58,8 +60,8 @@ impl<'a> Sides<'a> {
             let properties = body.mass_properties();
             let arm = point - properties.world_com;
             slip += (body.linvel() + body.angvel().cross(arm)) * sign;
-            // A link's own inertia says nothing of the tree's; its part of `K`, small
-            // beside that of the light things that arms push, is left out.
+            // A link's own inertia does not represent the tree's, so its part of `K` is omitted.
+            // That part is small beside that of the light objects that arms push.
             if self.links[side] {
                 continue;
             }
@@ -93,11 +95,11 @@ impl<'a> Sides<'a> {
     }
 }
 
-/// How much a contact slides: 0 where the friction of the last step suffices to
-/// stop the slip in this one, 1 from twice that on.
+/// How much a contact slides: 0 if the friction of the last step suffices to stop the slip in this
+/// one, 1 from twice that on.
 ///
-/// The target slip slows the last of a slip down, which would let a rod creep
-/// out of a moving grip by millimetres; a gripped rod is left to stick.
+/// Near the end of a slip, the target slip slows the stopping. A rod would then creep out of a
+/// moving grip by millimetres, so a gripped rod may stick.
 fn sliding(v: [f32; 2], k: [[f32; 2]; 2], limit: f32) -> f32 {
     let needed = (v[0] / k[0][0]).hypot(v[1] / k[1][1]);
     if limit <= 0.0 {

@@ -1,11 +1,11 @@
-//! Places of joints, drives and frames of a scene in rapier.
+//! Joints, drives and frames of a scene, and their handles and indices in rapier.
 
 use asid_core::layout::JointKind;
 use mjcf_rs::extras::ActuatorKind;
 use nalgebra::{UnitQuaternion, Vector3};
 use rapier3d::dynamics::MultibodyJointHandle;
 
-/// A joint's place in rapier.
+/// A joint and its handle in rapier.
 #[derive(Clone, Debug)]
 pub struct JointSlot {
     /// Kind.
@@ -14,15 +14,15 @@ pub struct JointSlot {
     pub qpos: usize,
     /// First entry in `qvel`.
     pub qvel: usize,
-    /// Body that it moves, index in the layout.
+    /// Index in the layout of the body that it moves.
     pub body: usize,
     /// That body's parent.
     pub parent: usize,
     /// Handle in the multibodies; `None` for a free joint.
     pub handle: Option<MultibodyJointHandle>,
-    /// MJCF `ref`: what the coordinate reads where rapier's is zero.
+    /// MJCF `ref`: the value of the coordinate at rapier's zero.
     pub reference: f64,
-    /// Where its spring rests, in `qpos`.
+    /// Rest position of its spring, in `qpos`.
     pub spring_rest: f64,
 }
 
@@ -39,7 +39,7 @@ pub struct ActuatorSlot {
     pub force_range: Option<[f64; 2]>,
 }
 
-/// A place fixed in a body.
+/// A frame fixed in a body.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Body, index in the layout.

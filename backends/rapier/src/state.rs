@@ -1,8 +1,8 @@
-//! Everything that a simulation's future depends on, parameters apart.
+//! Everything that determines a simulation's future, except its parameters.
 //!
-//! A state is a set of rapier's own collections. Cloning them is what saving
-//! means, and it is exact: warm-starting impulses, contact graphs and the
-//! broad phase come along. rapier's pipeline is scratch memory and stays behind.
+//! A state is a set of rapier's own collections, and saving clones them. The copy is exact, as it
+//! includes warm-starting impulses, contact graphs and the broad phase. rapier's pipeline is
+//! scratch memory and is not saved.
 
 use asid_core::Status;
 use rapier3d::dynamics::{
@@ -30,11 +30,11 @@ pub struct State {
     pub impulse_joints: ImpulseJointSet,
     /// Articulated trees.
     pub multibodies: MultibodyJointSet,
-    /// None of these are ever made; the pipeline asks for the collection.
+    /// Always empty; the pipeline requires the collection.
     pub soft_bodies: SoftBodySet,
     /// Continuous collision detection, which is off.
     pub ccd: CCDSolver,
-    /// Rolling and torsional resistance that contacts remember.
+    /// Rolling and torsional resistance stored by contacts.
     pub resistance: Resistance,
     /// Mass properties and places that the collections were built with.
     pub structure: Structure,

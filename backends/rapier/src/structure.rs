@@ -1,10 +1,10 @@
-//! Parameters that are built into the bodies: masses and places of geoms, and
-//! the mass properties of bodies that follow from them.
+//! Parameters that are built into the bodies: masses and positions of geoms, and the resulting mass
+//! properties of bodies.
 //!
-//! These live inside rapier's collections, hence inside a state, although
-//! parameters are not part of a state. So a state remembers which values it was
-//! built with, and a simulation that takes the state over rebuilds only what
-//! differs from its own; where nothing differs not a bit is touched.
+//! These are stored in rapier's collections and hence in a state, although parameters are not part
+//! of a state. A state therefore remembers the values it was built with. A simulation that takes
+//! over the state rebuilds only what differs from its own values. Where nothing differs, not a bit
+//! changes.
 
 use asid_mjcf::mass::{GeomMass, MassProperties};
 use mjcf_rs::Model;
@@ -17,24 +17,24 @@ use crate::convert;
 /// Values of the structural parameters, of every geom and body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
-    /// Place in its body (m) and mass (kg) of each geom.
+    /// Position in its body (m) and mass (kg) of each geom.
     pub geoms: Vec<GeomValues>,
-    /// What parameters set on each body directly.
+    /// Values that parameters set on each body directly.
     pub bodies: Vec<BodyValues>,
-    /// Place of each body in its parent, m.
+    /// Position of each body in its parent, m.
     pub places: Vec<Vector3<f64>>,
     /// Anchor of each joint in its body, m.
     pub anchors: Vec<Vector3<f64>>,
-    /// Axis of each joint in its body; only its direction counts.
+    /// Axis of each joint in its body; only its direction matters.
     pub axes: Vec<Vector3<f64>>,
 }
 
 /// Structural values of one geom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GeomValues {
-    /// Place in its body, m.
+    /// Position in its body, m.
     pub position: Vector3<f64>,
-    /// Mass, kg; zero for a geom that has none.
+    /// Mass, kg; zero for a geom without mass.
     pub mass: f64,
 }
 
@@ -49,7 +49,7 @@ pub struct BodyValues {
     pub inertia: [Option<f64>; 3],
 }
 
-/// How the mass of each body comes about.
+/// How the mass of each body is determined.
 #[derive(Clone, Debug)]
 pub struct MassModel {
     /// Per body: the `<inertial>` element, where it counts.
@@ -76,7 +76,7 @@ pub struct Inertia {
 }
 
 impl MassModel {
-    /// Reads how masses come about, and the values as they are.
+    /// Reads from the document how masses are determined, and the nominal values.
     pub fn new(model: &Model) -> (Self, Structure) {
         let mut mass_model = Self {
             inertials: Vec::new(),
@@ -120,7 +120,7 @@ impl MassModel {
         (mass_model, structure)
     }
 
-    /// True where a body's mass comes from its geoms.
+    /// Whether a body's mass comes from its geoms.
     pub fn follows_geoms(&self, body: usize) -> bool {
         self.inertials[body].is_none()
     }
@@ -130,12 +130,12 @@ impl MassModel {
         self.geoms_of[body].clone()
     }
 
-    /// True where a geom is a primitive, whose mass can be changed.
+    /// Whether a geom is a primitive, whose mass can be changed.
     pub fn is_primitive(&self, geom: usize) -> bool {
         self.geoms[geom].is_some()
     }
 
-    /// That of a body's geoms, as the document has them or with other values.
+    /// Mass properties of a body's geoms, with the values of the document or others.
     fn of_geoms(&self, body: usize, structure: Option<&Structure>) -> Inertia {
         let geoms: Vec<GeomMass> = self.geoms_of[body]
             .clone()
@@ -158,8 +158,10 @@ impl MassModel {
         }
     }
 
-    /// Mass properties of a body. Where its geoms are not as in the document, a centre of mass that is
-    /// set moves by as much as it differs from the document, and a moment is scaled by as much.
+    /// Mass properties of a body.
+    ///
+    /// If its geoms differ from the document, a centre of mass that is set moves by its difference
+    /// from the document. A moment is scaled by its ratio to the document.
     pub fn inertia(&self, body: usize, structure: &Structure) -> Inertia {
         let given = self.inertials[body];
         let mut inertia = given.unwrap_or_else(|| self.of_geoms(body, Some(structure)));
@@ -188,7 +190,7 @@ impl MassModel {
     }
 }
 
-/// The `<inertial>` of a body, where the compiler's settings let it count.
+/// The `<inertial>` of a body, if the compiler's settings use it.
 fn inertial(body: &Body, compiler: &Compiler) -> Option<Inertia> {
     let given = body.inertial.as_ref()?;
     if compiler.inertia_from_geom == InertiaFromGeom::True && !body.geoms.is_empty() {

@@ -1,4 +1,4 @@
-//! One simulation: a state, its parameters, and rapier's pipeline to step it.
+//! One simulation: its state, its parameters, and rapier's pipeline that steps it.
 
 mod divergence;
 mod forces;
@@ -27,13 +27,13 @@ pub struct World {
     pub state: State,
     /// Parameters.
     pub tables: Tables,
-    /// Steps taken since it was made.
+    /// Steps taken since its creation.
     pub steps: u64,
     pipeline: PhysicsPipeline,
-    /// Bodies with a force on them in this step.
+    /// Bodies with an applied force in this step.
     pushed: Vec<RigidBodyHandle>,
     torques: Vec<(usize, Vector)>,
-    /// Body with a force beyond [`MAX_FORCE`] on it in this step.
+    /// Body whose applied force exceeds [`MAX_FORCE`] in this step.
     excess: Option<usize>,
     /// Orientations of floating roots before the step.
     rotations: Vec<Rotation>,
@@ -44,13 +44,13 @@ pub struct World {
     live: Vec<f64>,
 }
 
-/// What acts on one physics step.
+/// Inputs of one physics step.
 pub struct StepInput<'a> {
     /// Command, `nu`.
     pub ctrl: &'a [f64],
-    /// Bodies of the layout with force (N) and torque (N m) on them.
+    /// Bodies of the layout with applied force (N) and torque (N m).
     pub wrenches: &'a [(usize, &'a [f64])],
-    /// Physics the engine lacks.
+    /// Hook with physics that the engine lacks.
     pub hook: Option<&'a dyn StepHook>,
     /// Columns of the batch, which the hook may change for the step.
     pub slots: &'a [ParameterSlot],
@@ -82,19 +82,19 @@ impl World {
         world
     }
 
-    /// Puts it into the scene's start state, at time zero.
+    /// Resets it to the scene's start state, at time zero.
     pub fn reset(&mut self, compiled: &Compiled) {
         self.place(compiled, &compiled.start.0, &compiled.start.1, 0.0);
     }
 
-    /// Puts it into a state without a history.
+    /// Sets a state without a history.
     pub fn place(&mut self, compiled: &Compiled, qpos: &[f64], qvel: &[f64], time: f64) {
         self.adopt(compiled, &compiled.pristine);
         self.state.set_coordinates(compiled, qpos, qvel);
         self.state.time = time;
     }
 
-    /// Takes over a state and gives it this simulation's parameters.
+    /// Takes over a state and applies this simulation's parameters.
     pub fn adopt(&mut self, compiled: &Compiled, state: &State) {
         self.state.clone_from(state);
         self.state.rebuild(compiled, &self.tables);
@@ -104,7 +104,7 @@ impl World {
         }
     }
 
-    /// Takes one physics step. What goes wrong in it ends in the status.
+    /// Takes one physics step; a failure is recorded in the status.
     pub fn step(&mut self, compiled: &Compiled, input: &StepInput<'_>) {
         if !self.state.status.is_running() {
             return;
@@ -234,7 +234,7 @@ impl World {
         }
     }
 
-    /// Exchanges the parameters that may change during a rollout with what the hook wants.
+    /// Exchanges the live parameters with the values that the hook wants.
     fn swap_live(&mut self, compiled: &Compiled, slots: &[ParameterSlot]) {
         for (slot, wanted) in slots.iter().zip(&mut self.live) {
             if slot.is_live() {

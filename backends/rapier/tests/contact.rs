@@ -1,5 +1,5 @@
-//! Contact against theory. Single precision and steps of 2 ms: where no other
-//! reason is given, half a per cent is what integration in steps leaves.
+//! Contact against theory, in single precision and steps of 2 ms. Unless another reason is given,
+//! half a per cent is the error of integration in steps.
 
 #![allow(clippy::unwrap_used)]
 
@@ -77,8 +77,8 @@ fn a_sliding_box_stops_where_coulomb_says() {
     }
 }
 
-/// A rod that touches the ground by its ends, like that of rod balancing: its
-/// contacts feel four times more inertia one way than the other.
+/// A rod that touches the ground at its ends, like that of rod balancing. Its contacts see four
+/// times more inertia in one direction than in the other.
 fn rod() -> Bench {
     Bench::new(
         r#"<option timestep="0.002"/>
@@ -106,7 +106,7 @@ fn friction_is_the_same_in_every_direction_along_a_rod() {
             "yaw {yaw}: {} m",
             end[0]
         );
-        // Sideways drift and turning are what friction in the wrong direction gives.
+        // Friction in the wrong direction would cause sideways drift and turning.
         assert!(
             end[1].abs() < 0.005 * expected,
             "yaw {yaw}: drifts {} m",
@@ -124,13 +124,13 @@ fn a_spinning_rod_slows_by_the_moment_of_its_ends() {
     let mut bench = rod();
     bench.place(&[0., 0., 0.02, 1., 0., 0., 0.], &[0., 0., 0., 0., 0., 5.]);
     let rows = bench.run(125, &[]);
-    // Each end bears on four corners; moment of inertia of two boxes of 0.1 kg.
+    // Each end rests on four corners; moment of inertia of two boxes of 0.1 kg.
     let lever = [0.09f64, 0.15].map(|y| y.hypot(0.02)).iter().sum::<f64>() / 2.0;
     let inertia = 0.2 * (0.12f64.powi(2) + (0.04f64.powi(2) + 0.06f64.powi(2)) / 12.0);
     let expected = 0.2 * 0.2 * G * lever / inertia;
     let slowing = (rows[24][12] - rows[124][12]) / 0.2;
-    // Statics leave open how a box shares its load between its inner and outer
-    // corners: within 5 %, where all on the inner ones would be 24 % less.
+    // Statics do not determine how a box shares its load between its inner and outer corners. The
+    // result is within 5 %; with all load on the inner ones it would be 24 % less.
     assert!(
         (slowing / expected - 1.0).abs() < 0.05,
         "{slowing} rad/s², not {expected}"
@@ -159,7 +159,7 @@ fn a_rolling_ball_stops_where_rolling_friction_says() {
         let mut bench = ball(6, 0.0, rolling, "0 0 -9.81");
         bench.place(&[0., 0., 0.05, 1., 0., 0., 0.], &[0.5, 0., 0., 0., 10., 0.]);
         let rows = bench.run(4000, &[]);
-        // The torque rolling * m g stops a solid sphere that rolls: a = 5/7 rolling g / R.
+        // The torque rolling * m g stops a rolling solid sphere: a = 5/7 rolling g / R.
         let expected = 0.25 / (2.0 * 5.0 / 7.0 * rolling / 0.05 * G);
         let error = rows[3999][0] / expected - 1.0;
         assert!(error.abs() < 0.01, "rolling friction {rolling}: {error}");
@@ -186,7 +186,7 @@ fn a_ball_on_a_slope_rolls_only_beyond_rolling_friction() {
     let rows = bench.run(2000, &[]);
     let moved = rows[1999][0] - rows[999][0];
     assert!(moved.abs() < 1e-4, "creeps {moved} m in 2 s");
-    // The net torque is that of the slope less that of rolling friction.
+    // The net torque is that of the slope minus that of rolling friction.
     let rolls = 1.5 * 0.002 / 0.05 * G;
     let mut bench = ball(6, 0.0, 0.002, &format!("{rolls} 0 -9.81"));
     let rows = bench.run(1000, &[]);
@@ -241,8 +241,8 @@ fn a_stack_of_boxes_stands() {
 
 #[test]
 fn contact_rules_are_mujocos() {
-    // Bits of one direction suffice, `exclude` and a higher priority count, and a
-    // body does not meet its parent.
+    // Bits of one direction suffice, `exclude` and a higher priority apply, and a body does not
+    // touch its parent.
     let inside = r#"
       <worldbody>
         <geom name="floor" type="plane" size="5 5 .1" contype="1" conaffinity="0" friction="0.2 0 0" priority="1"/>
@@ -280,12 +280,12 @@ fn contact_rules_are_mujocos() {
         bench.simulator.status()
     );
     assert!(end[2] < -4.0, "bits that do not match met");
-    // The floor's priority makes its 0.2 count and not the larger 1.
+    // The floor has priority, so its 0.2 counts and not the larger 1.
     let slid = end[7] - 1.0;
     assert!((slid * 2.0 * 0.2 * G - 1.0).abs() < 0.02, "slid {slid} m");
     assert!(end[16] < -4.0, "an excluded pair met");
     assert_eq!(end[22], 0.0);
-    // Free of contact with the post it hangs from, the arm swings.
+    // Without contact to the post that carries it, the arm swings.
     assert!(rows.iter().any(|r| r[21] > 1.5));
 }
 
@@ -328,7 +328,7 @@ fn a_moving_link_carries_what_lies_on_it_by_coulombs_law() {
         } else {
             assert!((gain / (0.2 * G) - 1.0).abs() < 0.03, "{gain} m/s²");
         }
-        // It is not dragged sideways, and hardly turned.
+        // It is not dragged sideways, and it hardly turns.
         assert!(
             rows[199][8].abs() < 3e-3,
             "drifts {} m sideways",

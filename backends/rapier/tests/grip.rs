@@ -30,11 +30,11 @@ const SCENE: &str = r#"<option timestep="0.002"/>
     <position joint="left" kp="2500" kv="60"/><position joint="right" kp="2500" kv="60"/>
   </actuator>"#;
 
-/// Command of an open finger, m. Closed is zero; the rod's half width of 0.02 m
-/// keeps a finger that far from it.
+/// Command of an open finger, m. Closed is zero; the rod's half width of 0.02 m blocks a finger at
+/// that distance.
 const OPEN: f64 = 0.045;
 
-/// Moves linearly from one command to the next and gives the last row.
+/// Moves linearly from one command to the next, and returns the last row.
 fn go(bench: &mut Bench, from: [f64; 4], to: [f64; 4], frames: usize) -> Vec<f64> {
     let mut last = Vec::new();
     for i in 0..frames {
@@ -45,8 +45,8 @@ fn go(bench: &mut Bench, from: [f64; 4], to: [f64; 4], frames: usize) -> Vec<f64
     last
 }
 
-/// Lays the rod's point `pick` (m from its centre of mass) over the ledge and
-/// lets go; gives the readings in the grip and at the end.
+/// Lays the rod's point `pick` (m from its centre of mass) over the ledge and releases it. Returns
+/// the readings in the grip and at the end.
 fn lay_down(offset: f64, pick: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let channels = [
         "qpos.rod",
@@ -71,7 +71,7 @@ fn lay_down(offset: f64, pick: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let held = go(&mut bench, now, now, 300);
     let carried = [0.4, 0.16, 0.0, 0.0];
     go(&mut bench, now, carried, 600);
-    // Half a millimetre above the ledge's 0.15 m the rod is let go.
+    // The rod is released half a millimetre above the ledge's 0.15 m.
     let low = [0.4, 0.1505, 0.0, 0.0];
     go(&mut bench, carried, low, 150);
     let before = go(&mut bench, low, low, 200);
@@ -90,7 +90,7 @@ fn tilt_deg(row: &[f64]) -> f64 {
 #[test]
 fn a_grip_carries_its_weight_without_slip() {
     let (held, before, _) = lay_down(0.05, 0.0);
-    // The servos press with kp times what the rod keeps them from.
+    // The servos press with kp times the distance that the rod blocks.
     for force in &held[9..11] {
         assert!((force - 50.0).abs() < 2.0, "{force} N");
     }
@@ -107,7 +107,8 @@ fn a_grip_carries_its_weight_without_slip() {
 
 #[test]
 fn a_rod_balances_only_over_its_center_of_mass() {
-    // The ledge is 0.04 m wide: 10 mm off stays, 30 mm off falls, either way.
+    // The ledge is 0.04 m wide: with an offset of 10 mm the rod stays, with 30 mm it falls, on
+    // either side.
     for (pick, stays) in [(-0.01, true), (0.01, true), (-0.03, false), (0.03, false)] {
         let (_, _, end) = lay_down(0.06, pick);
         let level = tilt_deg(&end) < 1.0 && (end[2] - 0.17).abs() < 2e-3;

@@ -13,12 +13,12 @@ fn a_body_falls_freely_and_keeps_its_spin() {
     let inside = r#"<worldbody><body name="b" pos="0 0 5"><freejoint name="b"/>
       <geom type="box" size=".1 .1 .1" pos=".05 0 0" mass="1"/></body></worldbody>"#;
     let mut bench = Bench::new(inside, &["qpos.b", "qvel.b"]);
-    // Turning about the centre of mass, which is not the origin.
+    // It turns about the centre of mass, which is not the origin.
     bench.place(&[0., 0., 5., 1., 0., 0., 0.], &[1., 0.15, 0., 0., 0., -3.]);
     let rows = bench.run(500, &[]);
     let end = &rows[499];
-    // Semi-implicit Euler falls by g dt t / 2 more in substeps of 1 ms; the centre
-    // of mass flies straight and is 0.05 m along the body's x axis.
+    // Semi-implicit Euler falls by g dt t / 2 more in substeps of 1 ms. The centre of mass flies
+    // straight and is 0.05 m along the body's x axis.
     let (sin, cos) = (-3.0f64).sin_cos();
     let height = 5.0 - 0.5 * G - 0.5 * G * 0.001;
     assert!(
@@ -45,7 +45,7 @@ fn unit_torque_gives_the_expected_acceleration() {
         "{}",
         rows[99][0]
     );
-    // A slide: one newton on two kilograms.
+    // A slide: one newton acts on two kilograms.
     let inside = r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" type="slide" axis="0 1 0"/>
       <geom type="sphere" size=".1" mass="2"/></body></worldbody><actuator><motor joint="j"/></actuator>"#;
     let rows = Bench::new(inside, &["qvel.j", "qpos.j"]).run(500, &[1.0]);
@@ -77,7 +77,7 @@ fn a_pendulum_keeps_its_energy_and_period() {
         crossings.next_back().unwrap().0,
     );
     let period = (last - first) as f64 * 0.002 / 6.0;
-    // Series of the exact period for an amplitude of 0.5 rad.
+    // Series of the exact period at an amplitude of 0.5 rad.
     let expected = std::f64::consts::TAU * (inertia / (0.5 * G)).sqrt() * (1.0 + 0.25 / 16.0);
     assert!(
         (period / expected - 1.0).abs() < 0.005,
@@ -100,7 +100,7 @@ fn servo(kp: f64, kv: f64, more: &str) -> Bench {
 
 #[test]
 fn a_servo_answers_a_step_like_its_differential_equation() {
-    // 0.1 q'' + 1 q' + 10 q = 10: damped at half of critical.
+    // 0.1 q'' + 1 q' + 10 q = 10: half of critical damping.
     let rows = servo(10.0, 1.0, "").run(1000, &[1.0]);
     let (omega, zeta) = (10.0, 0.5f64);
     let damped = omega * (1.0 - zeta * zeta).sqrt();
@@ -121,7 +121,7 @@ fn a_servo_answers_a_step_like_its_differential_equation() {
 fn a_stiff_servo_is_stable_and_exact_at_rest() {
     let rows = servo(4000.0, 400.0, "").run(1000, &[0.3]);
     assert!((rows[999][0] - 0.3).abs() < 1e-5);
-    // Overdamped with the slow rate near kp / kv = 10 per second.
+    // Overdamped, with the slow rate near kp / kv = 10 per second.
     let expected = 0.3 * (1.0 - (-10.0f64 * 0.2).exp());
     assert!((rows[99][0] - expected).abs() < 0.01, "{}", rows[99][0]);
     assert!(rows.iter().all(|r| r[0] < 0.3001), "overshoots");
@@ -136,8 +136,8 @@ fn a_limited_servo_pushes_with_its_limit() {
     let mut bench = Bench::new(inside, &["qpos.j", "qvel.j"]);
     let rows = bench.run(6000, &[50.0]);
     assert!((rows[99][1] - 0.4).abs() < 1e-3, "{} rad/s", rows[99][1]);
-    // Then it follows 1 - q, with a command that is clamped to 1 as well, and
-    // never changes its force by more than its limits in one step.
+    // Then it follows 1 - q, with a command that is clamped to 1 as well. Its force never changes
+    // by more than its limits in one step.
     assert!((rows[5999][0] - 1.0).abs() < 1e-3, "{} rad", rows[5999][0]);
     assert!(
         rows[1000..]
@@ -163,7 +163,8 @@ fn joint_friction_holds_up_to_its_bound() {
 
 #[test]
 fn damping_springs_reference_and_limits_are_mujocos() {
-    // Damping alone: the rate decays with damping over inertia, and there is none unasked.
+    // Damping alone: the rate decays with damping over inertia. Without the attribute there is
+    // none.
     let inside = |more: &str| {
         format!(
             r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1" {more}/>
@@ -176,7 +177,7 @@ fn damping_springs_reference_and_limits_are_mujocos() {
         let rate = bench.run(500, &[])[499][0];
         assert!((rate - expected).abs() < 0.003, "{rate} against {expected}");
     }
-    // A spring pulls to springref, whatever ref is; readings count from ref.
+    // A spring pulls to springref, whatever ref is; readings are relative to ref.
     let mut bench = Bench::new(
         &inside(r#"ref="0.2" springref="0.5" stiffness="5" damping="1""#),
         &["qpos.j"],
@@ -202,7 +203,7 @@ fn a_body_with_gravity_compensation_floats() {
 
 #[test]
 fn a_ball_joint_turns_like_a_free_top() {
-    // Torque-free and isotropic: the rate stays, the rotation is its integral.
+    // Torque-free and isotropic: the rate stays constant, and the rotation is its integral.
     let inside = r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" type="ball"/>
       <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>
       <sensor><ballquat name="q" joint="j"/><ballangvel name="w" joint="j"/></sensor>"#;
@@ -227,7 +228,7 @@ fn a_ball_joint_turns_like_a_free_top() {
 
 #[test]
 fn a_floating_tree_keeps_its_momentum() {
-    // A base whose centre of mass is not its origin, and a link on it, set spinning.
+    // A spinning base whose centre of mass is not its origin, with a link on it.
     let inside = r#"<option gravity="0 0 0"/><worldbody><body name="base"><freejoint name="base"/>
         <geom type="box" size=".1 .1 .02" pos=".1 0 0" mass="1"/>
         <body name="lid" pos="0.2 0 0"><joint name="lid" axis="0 0 1"/>

@@ -1,4 +1,4 @@
-//! Every kind of parameter acts, and acts as it says.
+//! Every kind of parameter has an effect, and the right one.
 
 #![allow(clippy::unwrap_used)]
 
@@ -63,7 +63,7 @@ fn every_parameter_acts() {
         ("option/gravity/2", -5.0, "qpos.arm"),
     ];
     for (target, value, channel) in cases {
-        // The y and z components matter for some: the first that differs decides.
+        // For some, the y and z components matter: the first that differs decides.
         let mut nominal = Bench::with(&scene(SCENE), &[channel], 2, 1, &[target]);
         let model = Rapier.load(&scene(SCENE)).unwrap();
         let parsed: Target = target.parse().unwrap();
@@ -120,7 +120,8 @@ fn a_mass_off_the_middle_loads_that_side() {
     );
     bench.simulator.set_parameters(&[0], &[0.05, 0.6]).unwrap();
     let end = bench.run(500, &[]).pop().unwrap();
-    // Feet bear somewhere over their 0.02 m width: moments are known to that.
+    // Each foot bears somewhere within its 0.02 m width, so moments are only known to that
+    // accuracy.
     let total = 0.7 * G;
     assert!((end[0] + end[1] - total).abs() < 0.01, "{end:?}");
     let lean = (end[1] - end[0]) * 0.1 / total;
@@ -208,20 +209,20 @@ fn a_friction_that_never_counts_is_refused() {
             error.contains("geom/crate/friction/0") && says.iter().all(|s| error.contains(s));
         assert!(whole && error.lines().count() == 1, "{error}");
     };
-    // A pair with the floor leaves the crate's own friction to the ball.
+    // With an explicit pair for the floor, the crate's own friction matters only for the ball.
     let pair =
         r#"<contact><pair geom1="floor" geom2="crate" friction="0.5 0.5 0.1 0.1 0.1"/></contact>"#;
     let paired = format!("{SCENE}{pair}");
     assert!(nominal(&paired).is_ok());
-    // Without contact bits the crate touches the floor alone, by the pair.
+    // Without contact bits the crate touches only the floor, by the pair.
     let own = r#"<geom name="crate" "#;
     let ghost = format!(r#"{own}contype="0" conaffinity="0" "#);
     let alone = paired.replace(own, &ghost);
     refused(&alone, ["<pair>", "`floor`"]);
-    // A pair without a friction leaves that to its geoms.
+    // A pair without friction takes that of its geoms.
     let plain = alone.replace(r#" friction="0.5 0.5 0.1 0.1 0.1""#, "");
     assert!(nominal(&plain).is_ok());
-    // All others rule the crate; with one fewer its friction counts.
+    // All others have priority over the crate; with one fewer its friction counts.
     let others = SCENE.replace("<geom ", r#"<geom priority="1" "#);
     let others = others.replace(
         r#"<geom priority="1" name="crate""#,

@@ -43,7 +43,7 @@ fn the_layout_is_in_document_order() {
     assert_eq!(layout.actuators[0].name, "actuator0");
     assert_eq!(layout.actuators[1].ctrl_range, Some([-1.0, 1.0]));
     assert_eq!((layout.sensors[1].address, layout.sensors[1].len), (1, 4));
-    // A batch starts in the first keyframe.
+    // A batch starts at the first keyframe.
     let mut bench = Bench::new(inside, &["qpos.fly", "angle", "qpos.slide"]);
     let start = bench.read();
     for (read, set) in start.iter().zip([0., 0., 2., 1., 0., 0., 0., 0.4, 0.1]) {
@@ -89,10 +89,10 @@ fn sensors_read_frames_where_they_are() {
     for (i, (a, b)) in read.iter().zip(expected).enumerate() {
         assert!((a - b).abs() < 1e-6, "entry {i}: {a} against {b}");
     }
-    // After steps the velocity is that of the present, not of a substep before.
+    // After steps the velocity is the current one, not that of the previous substep.
     let row = bench.run(10, &[]).pop().unwrap();
     assert!((row[3].hypot(row[4]) - 2.0).abs() < 1e-4 && (row[31] - 0.02).abs() < 1e-9);
-    // What it cannot read is refused when it is asked for.
+    // A sensor that it cannot read is refused when it is requested.
     let record = bench.simulator.layout().recording(&["torque"]).unwrap();
     let error = bench
         .simulator

@@ -9,8 +9,8 @@ use asid_core::simulator::{ExternalForce, StepHook, StepView};
 use asid_core::{Control, Rollout, Status};
 use support::{Bench, scene};
 
-/// A jointed finger that pushes a box with rolling resistance into another one,
-/// under a weld: all kinds of state that there are.
+/// A jointed finger that pushes a box with rolling resistance into another one, under a weld. It
+/// contains all kinds of state.
 const BUSY: &str = r#"<option timestep="0.002"/>
   <worldbody>
     <geom type="plane" size="5 5 .1" condim="6" friction="0.4 0.01 0.002"/>
@@ -66,7 +66,7 @@ fn a_loaded_state_goes_on_to_the_bit() {
     let before = bench.read();
     let on = bench.run(200, &PUSH);
     assert_eq!(bits(&on[..200]), bits(&on[200..400]));
-    // Into a simulation with another past, and back into the same one.
+    // Into a simulation with another history, and back into the same one.
     bench.simulator.reset(&[1]).unwrap();
     bench
         .simulator
@@ -112,7 +112,7 @@ fn a_loaded_state_takes_its_own_parameters() {
     bench.simulator.load(&saved, &[0, 0], &[0, 1]).unwrap();
     let apart = bench.run(200, &PUSH);
     assert_ne!(bits(&apart[..200]), bits(&apart[200..]));
-    // The same as parameters set after loading.
+    // The result equals that of setting parameters after loading.
     bench
         .simulator
         .set_parameters(&[0, 1], &[0.4, 1.0, 0.0, 0.4, 1.0, 0.0])
@@ -137,7 +137,7 @@ fn a_set_state_has_no_memory() {
     let mut qpos = vec![0.0; record.width()];
     bench.simulator.read(&[0], &record, &mut qpos).unwrap();
     let qvel: Vec<f64> = (0..layout.nv).map(|i| 0.02 * i as f64).collect();
-    // Two pasts, one state, one future.
+    // Two histories, one state, one future.
     bench.run(130, &PUSH);
     bench.simulator.reset(&[1]).unwrap();
     let both = [qpos.clone(), qpos].concat();
@@ -226,7 +226,7 @@ fn a_simulation_that_diverges_stops_alone() {
     assert!(first < rows[1].len() / 2 && rows[1][first..].iter().all(|x| x.is_nan()));
     assert_eq!(rows[0], rows[2]);
     assert_eq!(rows[0], busy(1, 1, &[]).run(50, &PUSH).concat());
-    // It comes back with a reset.
+    // A reset restores it.
     bench.simulator.reset(&[1]).unwrap();
     assert!(bench.simulator.status()[1].is_running());
     assert_eq!(bench.run(50, &PUSH)[50..100].concat(), rows[0]);
@@ -258,7 +258,7 @@ fn hooks_and_external_forces_push_alike() {
     rollout.hook = Some(&Push);
     bench.simulator.rollout(&rollout, &mut out).unwrap();
     let inertia = 0.4 * 0.02 / 12.0;
-    // One second of a constant force and torque; the changed command acts as well.
+    // One second of constant force and torque; the changed command acts as well.
     assert!((out[693] - 2.0).abs() < 1e-3, "{}", out[693]);
     assert!(
         (out[698] / (0.001 / inertia) - 1.0).abs() < 1e-3,

@@ -19,7 +19,7 @@ use crate::cli::settings::{Config, Stage, difficulty};
 pub struct Arm {
     /// The method.
     pub method: Method,
-    /// Options of its runs, but for seed and condition.
+    /// Options of its runs, without seed and condition.
     pub common: Common,
     /// Hash of the settings.
     pub hash: String,
@@ -28,7 +28,7 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// Resolves the settings of a cell's arm; `trained` are settings that name what was trained.
+    /// Resolves the settings of a cell's arm; `trained` are the settings that load trained files.
     ///
     /// # Errors
     /// When a setting is wrong.
@@ -41,7 +41,7 @@ impl Arm {
         let task = (find::<TaskEntry>(&key.task)?.make)()?;
         let mut common = Common {
             backend: Some(key.backend.clone()),
-            // Cells are the parallel axis.
+            // Cells run in parallel, so each uses one thread.
             threads: Some(1),
             base: of_method(document, &*task, method),
             quiet: true,
@@ -83,7 +83,7 @@ impl Arm {
     }
 }
 
-/// The method's parts, with the given settings as far as they have them.
+/// The method's parts with the given settings that apply to them.
 fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Table {
     let mut settings = document.settings.clone();
     let explorer = method.explores().then_some(&*method.explorer);
@@ -109,7 +109,7 @@ fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Tab
             put(section, "name", part);
         }
     }
-    // An estimator learns from episodes of the explorer that it works with.
+    // An estimator learns from episodes of the method's explorer.
     if let (Some(identifier), Some(explorer)) = (identifier, explorer)
         && known::<dyn Identifier>(task, "identifier", identifier)
             .iter()
@@ -117,7 +117,8 @@ fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Tab
     {
         put("identifier", "explorer", explorer);
     }
-    // A run plays what was trained before: where nothing ships, no run trains for itself alone.
+    // A run plays what was trained before. Where nothing is shipped, it fails rather than train for
+    // itself.
     if let Some(explorer) = explorer
         && known::<dyn Explorer>(task, "explorer", explorer)
             .iter()
@@ -135,8 +136,10 @@ fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Tab
     settings
 }
 
-/// Keeps of a section what concerns the algorithm `part`: all of it where the section names it,
-/// else the settings that it has. What no algorithm of the kind has stays, to be refused.
+/// Reduces a section to the settings that concern the algorithm `part`.
+///
+/// Where the section names `part`, all of it stays, else the settings that `part` has. A setting
+/// that no algorithm of the kind has stays too, and is refused later.
 fn keep<T: ?Sized + 'static>(
     settings: &mut toml::Table,
     task: &dyn Task,
@@ -166,8 +169,10 @@ fn keep<T: ?Sized + 'static>(
     }
 }
 
-/// Whether a setting is for the algorithm `part` on a task: it has it, or no algorithm of the kind has and
-/// it is to be refused.
+/// Whether a setting concerns the algorithm `part` on a task.
+///
+/// It does if `part` has the setting, or if no algorithm of the kind has it, so that it is refused
+/// later.
 pub fn reaches<T: ?Sized + 'static>(task: &dyn Task, section: &str, part: &str, key: &str) -> bool
 where
     AlgorithmEntry<T>: Entry,
@@ -177,7 +182,7 @@ where
     has(part) || !all.iter().any(|e| has(e.name()))
 }
 
-/// Settings that an algorithm has on a task; none where it is not registered.
+/// Settings that an algorithm has on a task; empty where it is not registered.
 fn known<T: ?Sized + 'static>(task: &dyn Task, section: &str, name: &str) -> Vec<String>
 where
     AlgorithmEntry<T>: Entry,

@@ -1,4 +1,4 @@
-//! One cell: a run of a method from a session of its own.
+//! One cell: a single run of a method in its own session.
 
 use std::time::Instant;
 
@@ -20,7 +20,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Opens the session of a cell.
 ///
 /// # Errors
-/// When a setting does not fit to the task or the engine.
+/// When a setting does not fit the task or the engine.
 pub fn open(arm: &Arm, key: &CellKey) -> Result<Session> {
     let mut common = arm.common.clone();
     common.seed = Some(key.seed);
@@ -33,7 +33,7 @@ pub fn open(arm: &Arm, key: &CellKey) -> Result<Session> {
     )
 }
 
-/// Runs a cell; the seconds that it took beside it.
+/// Runs a cell; returns it with the seconds that it took.
 ///
 /// # Errors
 /// When it cannot be opened, or an algorithm or the world fails.

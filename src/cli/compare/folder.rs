@@ -1,4 +1,4 @@
-//! The folder of a comparison: claimed before the work, summed up after it.
+//! The folder of a comparison: claimed before the work, summarised after it.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use serde::Serialize;
 use super::page;
 use crate::cli::output::OutFolder;
 
-/// What repeats a comparison, whatever the command line was that made it.
+/// The command that repeats a comparison, whatever command line made it.
 const REPEAT: &str = "asid compare --config config.toml";
 
-/// The comparison's folder: the one that is named, new or begun already, or the next free one.
+/// The comparison's folder: the named one, which is new or already begun, or the next free one.
 ///
 /// # Errors
 /// When it holds something else or cannot be written.
@@ -46,7 +46,7 @@ pub fn claim(out: Option<&Path>) -> Result<Store> {
             .and_then(|()| std::fs::create_dir(&path));
         match made {
             Ok(()) => return Ok(Store::new(&path)),
-            // Another process was faster; the next free one then.
+            // Another process was faster; try the next free one.
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
             Err(e) => return Err(wrong(&path, format!("cannot be made: {e}"))),
         }
@@ -70,18 +70,18 @@ fn only_hidden(path: &Path) -> bool {
     names.peek().is_some() && names.all(|n| n.to_string_lossy().starts_with(".config.toml."))
 }
 
-/// What is there of a plan.
+/// The existing results of a plan.
 pub struct Contents {
     /// Cells, in the plan's order.
     pub cells: Vec<Cell>,
-    /// Why others are not there, in the plan's order.
+    /// Why other cells are absent, in the plan's order.
     pub failures: Vec<Failure>,
-    /// Cells of which nothing is known yet.
+    /// Number of cells without result or failure.
     pub missing: usize,
 }
 
 impl Contents {
-    /// Whether one failure stands for every cell of its arm.
+    /// Whether a failure applies to every cell of its arm.
     fn rules_out(&self, failure: &Failure) -> bool {
         failure.of_all && !self.cells.iter().any(|c| c.key.arm_mate(&failure.key))
     }
@@ -92,7 +92,7 @@ impl Contents {
     }
 }
 
-/// Reads what is there of a plan.
+/// Reads the existing results of a plan.
 ///
 /// # Errors
 /// When a file cannot be read.
@@ -111,7 +111,7 @@ pub fn contents(store: &Store, keys: &[CellKey]) -> Result<Contents> {
         failures,
         missing: 0,
     };
-    // Of an arm that cannot be run one cell says so for all.
+    // If an arm cannot be run, the failure of one cell stands for all.
     let ruled_out = |key: &CellKey| {
         let mut failures = there.failures.iter();
         failures.any(|f| f.key.arm_mate(key) && there.rules_out(f))
@@ -120,7 +120,7 @@ pub fn contents(store: &Store, keys: &[CellKey]) -> Result<Contents> {
     Ok(there)
 }
 
-/// Seconds by cell, apart from everything that is the same for every run of a comparison.
+/// Computing times, kept apart from the results, which are the same for every run of a comparison.
 #[derive(Serialize)]
 struct Times {
     /// Sum over the cells, s.
@@ -138,7 +138,7 @@ struct TrainingTime {
     wall_s: f64,
 }
 
-/// What a comparison came to, summed up in its folder.
+/// A comparison, summarised in its folder.
 pub struct SummedUp {
     /// The rows.
     pub result: ComparisonResult,
@@ -163,10 +163,10 @@ impl SummedUp {
     }
 }
 
-/// Sums up what is there and writes the tables.
+/// Summarises the existing results and writes the tables.
 ///
 /// # Errors
-/// When a file cannot be written, or nothing is there.
+/// When a file cannot be written, or there are no results.
 pub fn sum_up(store: &Store, document: &Document, contents: &Contents) -> Result<SummedUp> {
     let plan = &document.plan;
     let settings = |hash: &str| store.settings(hash);
@@ -178,7 +178,7 @@ pub fn sum_up(store: &Store, document: &Document, contents: &Contents) -> Result
     write(&file("times.json"), &json(&times(store, &contents.cells)?)?)?;
     let html = page::html(plan, &result, &contents.cells, REPEAT);
     write(&file("report.html"), &html)?;
-    // The result last: where it is, all the rest is.
+    // Write the result last: its presence means that all the rest is there.
     write(&file("result.json"), &json(&result)?)?;
     Ok(SummedUp {
         result,
@@ -216,7 +216,7 @@ fn times(store: &Store, cells: &[Cell]) -> Result<Times> {
     })
 }
 
-/// In the folder of what was trained, the seconds that it took.
+/// Name of the file, in the folder of a training, that holds its seconds.
 pub const TRAINED: &str = "seconds";
 
 fn json(value: &impl Serialize) -> Result<String> {

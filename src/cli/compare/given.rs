@@ -1,14 +1,14 @@
-//! Which options a command line gave, so that none is passed over in silence.
+//! The options that a command line gave, so that none is silently ignored.
 
 use anyhow::Result;
 
 use super::{Arguments, Parts, Real};
 use crate::cli::settings::wrong;
 
-/// Options that say where a result goes and how it is told.
+/// Options for the place and the output of a result.
 const OUTPUT: [&str; 3] = ["--out", "--quiet", "--json"];
 
-/// Options of a merge: what finished comparisons hold is not chosen again.
+/// Options of a merge; what finished comparisons contain cannot be chosen again.
 const MERGE: [&str; 2] = ["--merge", "--across-commits"];
 
 /// Options of every figure.
@@ -22,10 +22,10 @@ const FIGURE: [&str; 7] = [
     "--backend",
 ];
 
-/// Options of a figure that plays episodes here.
+/// Options of a figure that plays episodes itself.
 const EPISODES: [&str; 2] = ["--episodes", "--explorer"];
 
-/// Options of a figure that is made of comparisons.
+/// Options of a figure that consists of comparisons.
 const COMPARISONS: [&str; 13] = [
     "TASK",
     "--levels",
@@ -126,7 +126,7 @@ impl Arguments {
         given.map(|(name, _)| *name).collect()
     }
 
-    /// Refuses what a figure does not use.
+    /// Refuses options that a figure does not use.
     ///
     /// # Errors
     /// When an option is given that it does not use, or there is no such figure.
@@ -154,7 +154,7 @@ impl Arguments {
         Ok(())
     }
 
-    /// Refuses what a merge does not use.
+    /// Refuses options that a merge does not use.
     ///
     /// # Errors
     /// When an option is given that it does not use.

@@ -1,4 +1,4 @@
-//! `asid compare --merge`: finished comparisons, or shares of one, put together.
+//! `asid compare --merge`: merges finished comparisons, or shares of one.
 
 use anyhow::Result;
 use asid_comparison::merge::{Commits, Merged, Part, unite};
@@ -9,7 +9,7 @@ use super::Arguments;
 use super::folder::{contents, sum_up};
 use crate::cli::output::OutFolder;
 
-/// Puts the cells of several folders into a new one, and sums them up.
+/// Puts the cells of several folders into a new one and summarises them.
 pub fn merge(arguments: &Arguments) -> Result<()> {
     let parts = arguments.merge.iter().map(|folder| Part::read(folder));
     let parts = parts.collect::<asid_core::Result<Vec<_>>>()?;
@@ -25,7 +25,7 @@ pub fn merge(arguments: &Arguments) -> Result<()> {
         }
         .into());
     }
-    // Where the folder is not named it is the next free one, which is made first.
+    // If no folder is named, claim the next free one before the work.
     let out = OutFolder::claim(arguments.out.as_deref(), "compare")?;
     let store = Store::new(&out.path());
     keep(&store, &merged)?;

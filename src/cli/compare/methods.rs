@@ -1,4 +1,4 @@
-//! The methods of a comparison, and which of their parts this build has.
+//! The methods of a comparison, and whether this build has their parts.
 
 use anyhow::Result;
 use asid_comparison::method::{BY_DEFAULT, Method};
@@ -8,7 +8,7 @@ use asid_core::registry::{Entry, ExplorerEntry, IdentifierEntry, SolverEntry, fi
 
 use crate::cli::list;
 
-/// The methods; parts of those that are no named method must exist.
+/// The methods; the parts of an unnamed method must exist.
 pub fn methods(given: &[String], base: Option<&Plan>) -> Result<Vec<Method>> {
     let methods = match (given, base) {
         ([], Some(base)) => base.methods.clone(),
@@ -22,7 +22,7 @@ pub fn methods(given: &[String], base: Option<&Plan>) -> Result<Vec<Method>> {
             .collect::<asid_core::Result<_>>()?,
     };
     for method in methods.iter().filter(|m| Method::named(&m.name).is_err()) {
-        // What this build could have is told of in the table; what nobody knows is a mistake.
+        // A part that other builds have is noted in the table; an unknown part is a mistake.
         if let Some((_, error @ Error::UnknownName { .. })) = lacking(method) {
             return Err(error.into());
         }
@@ -42,7 +42,7 @@ pub fn missing_part(method: &Method) -> Option<Error> {
     })
 }
 
-/// The first part of a method that is not registered, and what is known of it.
+/// The first part of a method that is not registered, with the reason.
 fn lacking(method: &Method) -> Option<(String, Error)> {
     fn of<E: Entry>(name: &str) -> Option<(String, Error)> {
         let unknown = find::<E>(name).err()?;

@@ -8,10 +8,10 @@ use asid_comparison::table::{grids, notes};
 use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
 
-/// Places at which the dots of a row's seeds lie side by side.
+/// Number of columns over which the dots of a row's seeds are spread.
 const ABREAST: u64 = 10;
 
-/// Width of a row's band of dots, in distances of rows.
+/// Width of a row's band of dots, in row distances.
 const BAND: f64 = 0.3;
 
 /// The page: tables, and pictures for each task, engine and world.
@@ -56,7 +56,7 @@ pub fn html(plan: &Plan, result: &ComparisonResult, runs: &[Run], repeat: &str) 
         .html()
 }
 
-/// A table as the page has it.
+/// A table in the page's format.
 pub fn table(grid: &Grid) -> Table {
     let columns = grid.head.iter().map(|h| {
         if h.number {
@@ -94,7 +94,7 @@ fn figures(result: &ComparisonResult, runs: &[Run], group: [&str; 3]) -> Vec<Fig
     let of: Vec<(&Run, f64)> = runs
         .iter()
         .filter(|r| [&*r.key.task, &*r.key.backend, &*r.key.world] == group)
-        // Seeds side by side, so that equal values do not hide each other.
+        // Seeds lie side by side, so that equal values do not hide each other.
         .filter_map(|r| {
             let abreast = (r.key.seed % ABREAST) as f64 / (ABREAST - 1) as f64;
             Some((r, place(r)? as f64 + BAND * (abreast - 0.5)))

@@ -1,4 +1,4 @@
-//! How far a comparison is, on standard error.
+//! Progress of a comparison on standard error.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use asid_comparison::cell::CellKey;
 
-/// How often a log, which no line is taken back from, is told.
+/// Time between two lines in a log, where no line can be overwritten.
 const LOG: Duration = Duration::from_secs(30);
 
-/// Counts cells as they are done.
+/// Counts finished cells.
 pub struct Progress {
     quiet: bool,
     total: usize,
@@ -23,7 +23,7 @@ struct State {
 }
 
 impl Progress {
-    /// For so many cells.
+    /// Progress of this many cells.
     pub fn new(quiet: bool, total: usize) -> Self {
         Self {
             quiet,
@@ -36,7 +36,7 @@ impl Progress {
         }
     }
 
-    /// A cell is done.
+    /// Counts a finished cell.
     pub fn advance(&self, key: &CellKey) {
         let Ok(mut state) = self.state.lock() else {
             return;
@@ -60,7 +60,7 @@ impl Progress {
         };
     }
 
-    /// Ends the line.
+    /// Ends the progress line.
     pub fn end(&self) {
         let mut stderr = std::io::stderr().lock();
         let told = self.state.lock().is_ok_and(|s| s.told.is_some());

@@ -1,4 +1,4 @@
-//! From the command line and a configuration to a plan and the settings of its runs.
+//! Turns the command line and a configuration into a plan and the settings of its runs.
 
 use anyhow::Result;
 use asid_comparison::document::Document;
@@ -18,8 +18,8 @@ use crate::cli::settings::{
     PRIOR, check_condition, default_backend, read_table, seed, set, text, wrong,
 };
 
-/// What is asked for: the command line over the configuration over a table of the paper over
-/// the defaults.
+/// The requested comparison. The command line overrides the configuration, which overrides a table
+/// of the paper, which overrides the defaults.
 pub fn document(arguments: &Arguments) -> Result<Document> {
     let mut settings = match &arguments.config {
         Some(path) => read_table(path)?,
@@ -30,8 +30,8 @@ pub fn document(arguments: &Arguments) -> Result<Document> {
     let of_run = OfRun::take(&mut settings)?;
     let base = match arguments.table {
         Some(table) => {
-            // No table of the paper shows what an episode was expected to tell, and the fits behind
-            // it cost as much as all else in a run.
+            // No table of the paper shows the expected information of an episode, and its fits cost
+            // as much as the rest of a run.
             let expected = subtable(&mut settings, "expected")?;
             expected.entry("rounds").or_insert(0.into());
             Some(of_table(table, arguments, base.as_ref())?)
@@ -79,7 +79,7 @@ pub fn document(arguments: &Arguments) -> Result<Document> {
     Ok(Document { plan, settings })
 }
 
-/// Files of the plugins that were named or that parts of the comparison are from.
+/// Files of the plugins that were named or that provide parts of the comparison.
 fn plugin_files(plan: &Plan) -> Vec<toml::Value> {
     let mut parts: Vec<_> = plan
         .task
@@ -110,7 +110,7 @@ fn seeds(quick: bool) -> u64 {
 fn of_table(table: u8, arguments: &Arguments, config: Option<&Plan>) -> Result<Plan> {
     let preset = preset::of_table(table)?;
     let quick = arguments.quick || config.is_some_and(|c| c.quick);
-    // The engine that can do everything, where there is one.
+    // Use the engine that has all capabilities, if there is one.
     let engines = registry::all::<BackendEntry>();
     let able = engines.iter().find(|e| {
         matches!(e.origin(), Origin::Linked(_))
@@ -138,7 +138,7 @@ fn of_table(table: u8, arguments: &Arguments, config: Option<&Plan>) -> Result<P
     })
 }
 
-/// Puts options that are settings into them, so that they are repeated.
+/// Writes options that are settings into the settings, so that the configuration repeats them.
 fn options(arguments: &Arguments, settings: &mut toml::Table) -> Result<()> {
     for assignment in &arguments.set {
         let key = assignment.split('=').next().unwrap_or_default().trim();
@@ -212,7 +212,7 @@ fn subtable<'t>(table: &'t mut toml::Table, key: &str) -> Result<&'t mut toml::T
         .ok_or_else(|| wrong(key, "is not a section of settings"))
 }
 
-/// Settings of a run that the plan takes over: what varies among the cells.
+/// Settings of a single run that the plan takes over, because they vary among the cells.
 #[derive(Default)]
 struct OfRun {
     task: Option<String>,
@@ -236,7 +236,7 @@ impl OfRun {
         let world = match settings.get_mut("real").and_then(toml::Value::as_table_mut) {
             None => None,
             Some(real) => {
-                // A run's file names the engine of its real world though it is the simulator's.
+                // A run's file names the engine of its real world even where it is the simulator's.
                 if backend.is_some()
                     && real.get("backend").and_then(|b| b.as_str()) == backend.as_deref()
                 {
@@ -285,7 +285,7 @@ fn tasks(
             let conditions = match (&*arguments.condition, of_base, &condition) {
                 ([], Some(task), _) => task.conditions.clone(),
                 ([], None, Some(one)) => vec![one.clone()],
-                // A task without conditions of its own is run over its prior.
+                // A task without conditions of its own runs over its prior.
                 ([], None, None) if all.is_empty() => vec![PRIOR.to_owned()],
                 ([], None, None) => all.iter().map(|c| c.name.clone()).collect(),
                 (given, _, _) => given.to_vec(),

@@ -1,4 +1,4 @@
-//! Going on with a comparison: what of its folder holds, and what is missing.
+//! Resuming a comparison: which results of its folder are valid, and which are missing.
 
 use std::collections::HashMap;
 
@@ -15,7 +15,7 @@ use super::cell::{COMMIT, VERSION};
 use super::work::{Arms, arm_name};
 use crate::cli::session;
 
-/// Cells of this share that are not there; those that are there must belong to this comparison.
+/// Missing cells of this share; existing ones must belong to this comparison.
 pub fn pending(
     arguments: &Arguments,
     store: &Store,
@@ -43,7 +43,7 @@ pub fn pending(
     Ok(pending)
 }
 
-/// Whether a cell that is there is one that would be run now.
+/// Checks that an existing cell is what a run would produce now.
 fn check_cell(store: &Store, cell: &Cell, arm: &Arm, engine: &str) -> Result<()> {
     let method = (
         &arm.method.explorer,
@@ -74,7 +74,7 @@ fn check_cell(store: &Store, cell: &Cell, arm: &Arm, engine: &str) -> Result<()>
     .into())
 }
 
-/// Whether the folder is new or holds a comparison that this one goes on with.
+/// Checks that the folder is new or holds a comparison that this one continues.
 pub fn same_comparison(arguments: &Arguments, store: &Store, document: &Document) -> Result<()> {
     if !store.is_begun() {
         return Ok(());

@@ -1,7 +1,7 @@
 //! How a comparison is stopped.
 //!
-//! SIGINT and SIGTERM end it at once: finished cells are files already, and those that run are
-//! lost. SIGUSR1 ends it without loss: no cell is begun any more, and those that run are finished.
+//! SIGINT and SIGTERM end it at once. Finished cells are already on disk; running cells are lost.
+//! SIGUSR1 ends it without loss: no further cell begins, and running cells are finished.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,25 +15,25 @@ use signal_hook::iterator::Signals;
 
 use crate::cli::failure;
 
-/// Status of a process that did not do all its work.
+/// Exit status of a process that did not finish its work.
 const STOPPED: i32 = 1;
 
-/// What goes on with a comparison.
+/// Text that says how to resume a comparison.
 pub fn how_to_go_on(out: &Path) -> String {
     let out = out.display();
     format!("`asid compare --config {out}/config.toml --out {out}` goes on with it")
 }
 
-/// What is stopped: how it is gone on with, and the word that no cell is to be begun.
+/// The comparison to stop: the line that says how to resume it, and the flag that stops new cells.
 struct Watched {
     line: String,
     drain: Arc<AtomicBool>,
 }
 
-/// The comparison that runs; a figure has several, one after the other.
+/// The running comparison; a figure has several, one after the other.
 static WATCHED: Mutex<Option<Watched>> = Mutex::new(None);
 
-/// Watches for signals from now on; the word is set once no cell is to be begun.
+/// Watches for signals from now on; the returned flag is set when no further cell may begin.
 ///
 /// # Errors
 /// When the system refuses to.
@@ -60,7 +60,7 @@ fn current() -> MutexGuard<'static, Option<Watched>> {
     WATCHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Stops what runs, as the signal asks for.
+/// Stops the work as the signal demands.
 fn stop(signal: i32) {
     let current = current();
     let Some(watched) = &*current else { return };
@@ -68,7 +68,7 @@ fn stop(signal: i32) {
         watched.drain.store(true, Ordering::SeqCst);
         failure::note("told to stop: runs that have begun are finished");
     } else {
-        // A file that is being written is finished, and no other one begun.
+        // Let a file that is being written finish, and begin no other.
         let _held = no_writer();
         failure::note(&watched.line);
         signal_hook::low_level::exit(STOPPED);

@@ -13,11 +13,11 @@ use super::request::document;
 use super::{Arguments, work};
 use crate::cli::failure;
 
-/// Most tasks of an array where nothing is said: what a cluster lets one user run at a time.
+/// Default limit of an array's simultaneous tasks: what a cluster typically allows one user.
 const JOBS: usize = 32;
 
-/// Writes the script of a job array into the comparison's folder, and submits it unless it is
-/// only to be seen.
+/// Writes the script of a job array into the comparison's folder, and submits it unless this is a
+/// dry run.
 ///
 /// # Errors
 /// When the call is wrong, the folder cannot be written, or sbatch refuses.

@@ -1,8 +1,8 @@
 //! `asid compare --train`: what learns is trained once for its task, engine and settings, and the
 //! cells load it.
 //!
-//! A training has a folder of its own below `policies/`, which takes its name when the training is
-//! done. Trainings are deterministic, so that of two processes that trained the same either's stays.
+//! A training has a folder of its own below `policies/`, which gets its name when the training is
+//! done. Trainings are deterministic, so if two processes trained the same, either result may stay.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -26,20 +26,21 @@ const POLICY: &str = "policy.safetensors";
 /// File of a trained identifier in its folder.
 const NETWORK: &str = "network.safetensors";
 
-/// Trains for arms into a comparison's folder.
+/// Trains arms into a comparison's folder.
 pub struct Trainer<'t> {
     /// The folder.
     pub store: &'t Store,
     /// Seed of every training.
     pub seed: u64,
-    /// Threads of a training; none for one a core.
+    /// Threads of a training; one a core where not given.
     pub threads: Option<usize>,
-    /// Whether nothing is told.
+    /// Whether to print nothing.
     pub quiet: bool,
 }
 
 impl Trainer<'_> {
-    /// Trains what the arm's method learns, or finds it trained: the settings that load it.
+    /// Trains what the arm's method learns, unless it is there already. Returns the settings that
+    /// load it.
     ///
     /// # Errors
     /// When a training fails or its files cannot be written.
@@ -49,7 +50,7 @@ impl Trainer<'_> {
         if !arm.method.explores() {
             return Ok(settings);
         }
-        // Training knows neither the real world nor the condition.
+        // Training depends neither on the real world nor on the condition.
         arm.common.set.retain(|s| !s.starts_with("real.world="));
         arm.common.threads = self.threads;
         arm.common.quiet = self.quiet;
@@ -77,7 +78,7 @@ impl Trainer<'_> {
             settings.push(setting);
         }
         if arm.method.identifies() {
-            // The identifier learns from episodes of the explorer as it is now.
+            // The identifier learns from episodes of the explorer with its current settings.
             let session = open(&arm, &key)?;
             let own = self.own(&session, &["explorer", "identifier"])?;
             let player = explorer(&session)?;
@@ -93,8 +94,11 @@ impl Trainer<'_> {
         Ok(settings)
     }
 
-    /// What decides a training: the settings of these parts, the simulator and the unknowns. Files count by
-    /// what they hold, so that a comparison whose folder was moved trains nothing anew.
+    /// Digest of what determines a training: the settings of these parts, the simulator and the
+    /// unknowns.
+    ///
+    /// Files count by their content, so that a comparison whose folder was moved trains nothing
+    /// again.
     fn own(&self, session: &Session, parts: &[&str]) -> Result<String> {
         let mut table = toml::Table::try_from(&session.config)?;
         for section in [
@@ -113,7 +117,8 @@ impl Trainer<'_> {
         Ok(digest(table.to_string().as_bytes()))
     }
 
-    /// The file of a training, trained where it is not there; none where nothing is learned.
+    /// The file of a training, which is run if the file is missing; `None` where nothing is
+    /// learned.
     fn once(
         &self,
         session: &Session,
@@ -145,7 +150,7 @@ impl Trainer<'_> {
         let wall_s = clock.elapsed().as_secs_f64();
         write(&partial.join(TRAINED), &format!("{wall_s:.1}\n"))?;
         if std::fs::rename(&partial, &place).is_err() {
-            // Another process has trained the same meanwhile.
+            // Another process has finished the same training meanwhile.
             let _ = std::fs::remove_dir_all(&partial);
         }
         if !place.join(TRAINED).is_file() {

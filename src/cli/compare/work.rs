@@ -20,10 +20,10 @@ use super::worker::Worker;
 use super::{Arguments, cell};
 use crate::cli::failure;
 
-/// Task, method, world and engine: what shares its settings.
+/// Task, method, world and engine: cells with the same four share their settings.
 pub type ArmName = [String; 4];
 
-/// The settings of every arm, or why it cannot be run.
+/// The settings of every arm, or the reason why it cannot be run.
 pub type Arms = HashMap<ArmName, Result<Arm, String>>;
 
 /// The arm that a cell belongs to.
@@ -31,15 +31,15 @@ pub fn arm_name(key: &CellKey) -> ArmName {
     [&key.task, &key.method, &key.world, &key.backend].map(String::clone)
 }
 
-/// What came of the work: nothing to sum up where only a share was asked for.
+/// The outcome of the work.
 pub struct Outcome {
-    /// The comparison, where it is complete.
+    /// The summary, if the comparison is complete.
     pub summed: Option<SummedUp>,
-    /// Runs that failed, in one error.
+    /// Failed runs, as one error.
     pub failed: Option<anyhow::Error>,
 }
 
-/// Runs what is missing of the comparison, sums it up once nothing is, and prints it.
+/// Runs the missing cells of the comparison, summarises it when complete, and prints it.
 pub fn work(arguments: &Arguments) -> Result<()> {
     let Outcome { summed, failed } = run(arguments)?;
     if let Some(summed) = summed {
@@ -48,7 +48,7 @@ pub fn work(arguments: &Arguments) -> Result<()> {
     failed.map_or(Ok(()), Err)
 }
 
-/// Runs what is missing of the comparison and sums it up once nothing is.
+/// Runs the missing cells of the comparison and summarises it when complete.
 ///
 /// # Errors
 /// When a setting is wrong, a file cannot be written, or the work was stopped.
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
     let store = claim(arguments.out.as_deref())?;
     same_comparison(arguments, &store, &document)?;
     if !document.plan.train {
-        // Cells that do not belong here are told of before anything is written.
+        // Report cells that do not belong here before anything is written.
         pending(arguments, &store, &keys, &arms)?;
     }
     write(&store.config(), &document.text()?)?;
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
     }
     let pending = pending(arguments, &store, &keys, &arms)?;
     if !pending.is_empty() && arguments.shard.is_none() {
-        // What was said of fewer cells does not hold any more.
+        // A summary of fewer cells is no longer valid.
         let _ = std::fs::remove_file(store.root().join("result.json"));
     }
     let worker = Worker::new(&store, &arms, &keys, arguments.quiet, pending.len());
@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
     finish(arguments, &store, &document, &keys, first)
 }
 
-/// Checks a comparison as far as can be told before any work.
+/// Checks a comparison as far as possible before any work.
 ///
 /// # Errors
 /// When a setting is wrong or an engine is missing.
@@ -135,7 +135,7 @@ fn train(
     Ok(())
 }
 
-/// The settings of every arm, or why it cannot be run in this build.
+/// The settings of every arm, or the reason why this build cannot run it.
 fn arms(document: &Document, keys: &[CellKey]) -> Result<Arms> {
     let mut arms = HashMap::new();
     for key in keys {
@@ -155,7 +155,7 @@ fn arms(document: &Document, keys: &[CellKey]) -> Result<Arms> {
     Ok(arms)
 }
 
-/// Opens one session of each task and engine, so that a wrong call ends before any work.
+/// Opens one session for each task and engine, so that a wrong call ends before any work.
 fn probe(keys: &[CellKey], arms: &Arms) -> Result<()> {
     let mut probed: Vec<(&str, &str)> = Vec::new();
     for key in keys {
@@ -170,7 +170,7 @@ fn probe(keys: &[CellKey], arms: &Arms) -> Result<()> {
     Ok(())
 }
 
-/// Sums up where nothing is missing, and says what is where something is.
+/// Summarises a complete comparison; otherwise reports what is missing.
 fn finish(
     arguments: &Arguments,
     store: &Store,
@@ -208,7 +208,7 @@ fn finish(
         return Err(first.unwrap_or_else(nothing));
     }
     let summed = sum_up(store, document, &there)?;
-    // A method that is left out with a reason is no failure; a run is.
+    // A method that is left out with a reason is no failure; a failed run is.
     let failed: Vec<&Failure> = there.single_failures().collect();
     let error = failed.first().map(|failure| {
         Error::Failed(format!(

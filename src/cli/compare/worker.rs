@@ -1,4 +1,4 @@
-//! Runs cells and keeps what comes of them, on any number of threads.
+//! Runs cells and stores their results, on any number of threads.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -13,18 +13,18 @@ use super::progress::Progress;
 use super::work::{ArmName, Arms, arm_name};
 use crate::cli::failure;
 
-/// What came in the way of a comparison.
+/// Problems during a comparison.
 #[derive(Default)]
 struct Trouble {
-    /// Arms of which no cell can be run.
+    /// Arms whose cells cannot be run.
     ruled_out: Vec<ArmName>,
     /// The first error of a cell.
     first: Option<anyhow::Error>,
-    /// A result that could not be kept.
+    /// The error of a result that could not be stored.
     unwritten: Option<anyhow::Error>,
 }
 
-/// Runs cells and keeps what comes of them.
+/// Runs cells and stores their results.
 pub struct Worker<'w> {
     store: &'w Store,
     arms: &'w Arms,
@@ -35,7 +35,7 @@ pub struct Worker<'w> {
 }
 
 impl<'w> Worker<'w> {
-    /// A worker for so many of the comparison's cells.
+    /// A worker for this many of the comparison's cells.
     pub fn new(
         store: &'w Store,
         arms: &'w Arms,
@@ -56,7 +56,7 @@ impl<'w> Worker<'w> {
         self.trouble.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A cell and its seconds; none where its arm was ruled out meanwhile.
+    /// Runs a cell; returns it with its seconds, or `None` if its arm was ruled out meanwhile.
     pub fn run(&self, key: &CellKey) -> Result<Option<(Cell, f64)>> {
         let name = arm_name(key);
         if self.trouble().ruled_out.contains(&name) {
@@ -73,7 +73,7 @@ impl<'w> Worker<'w> {
         }
     }
 
-    /// Keeps what came of a cell.
+    /// Stores the result of a cell.
     pub fn done(
         &self,
         key: &CellKey,
@@ -91,7 +91,7 @@ impl<'w> Worker<'w> {
         self.progress.advance(key);
     }
 
-    /// Notes why a cell failed. A call that is wrong for an arm's first cell is wrong for all.
+    /// Records why a cell failed. A wrong call in an arm's first cell is wrong for all.
     fn failed(&self, key: &CellKey, error: anyhow::Error) -> asid_core::Result<()> {
         let usage = error.downcast_ref::<Error>().is_some_and(Error::is_usage);
         let mut mates = self.keys.iter().filter(|k| k.arm_mate(key));
@@ -113,10 +113,10 @@ impl<'w> Worker<'w> {
         })
     }
 
-    /// Ends the work: the first error of a cell.
+    /// Ends the work and returns the first error of a cell.
     ///
     /// # Errors
-    /// When a result could not be kept.
+    /// When a result could not be stored.
     pub fn end(self) -> Result<Option<anyhow::Error>> {
         self.progress.end();
         let trouble = self

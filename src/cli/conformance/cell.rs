@@ -4,7 +4,7 @@ use asid_conformance::{Outcome, Row};
 use asid_report::number::{quantity, significant};
 use asid_report::page::{Cell, Gauge, Tone};
 
-/// A figure; its unit stands with the tolerance.
+/// Text of a value; its unit stands beside the tolerance.
 fn figure(row: &Row) -> String {
     row.value
         .map_or_else(|| "–".to_owned(), |value| significant(value, 2))
@@ -24,7 +24,7 @@ fn tone(outcome: Outcome) -> Tone {
     }
 }
 
-/// What a row is told as when the pointer rests on it.
+/// Tooltip of a row.
 fn hint(row: &Row) -> String {
     let share = match row.share() {
         Some(share) if row.tolerance > 0.0 => {
@@ -60,7 +60,7 @@ pub fn cell(row: Option<&Row>) -> Cell {
         _ => Cell::toned(figure(row), tone),
     };
     let cell = match row.share() {
-        // Where nothing is tolerated, a count has no place on the scale.
+        // With a tolerance of zero, a count has no place on the scale.
         Some(share) if row.tolerance > 0.0 || share == 0.0 => cell.gauge(Gauge::new(share, tone)),
         Some(_) => cell.gauge(Gauge::new(f64::INFINITY, tone)),
         None => cell,

@@ -1,4 +1,4 @@
-//! Which checks are asked, what they are, and the documents that they give an engine.
+//! Selection and listing of checks, and the documents that they give an engine.
 
 use std::io::Write as _;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::names;
 
-/// The checks whose names hold one of some texts, all where there is none.
+/// The checks whose names contain one of the patterns; all if there is no pattern.
 pub fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
     let all: Vec<&Check> = checks().collect();
     if let Some(text) = (patterns.iter()).find(|p| !all.iter().any(|c| c.name.contains(&***p))) {
@@ -22,21 +22,21 @@ pub fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
         .collect())
 }
 
-/// An error for a text that no check holds: the names that come close, else the families.
+/// An error for a pattern that no check contains: it lists similar names, else the families.
 fn unknown(text: &str, all: &[&Check]) -> Error {
-    /// Names that are told at most.
+    /// Largest number of names in the message.
     const MOST: usize = 5;
     let families: Vec<String> = (FAMILIES.iter())
         .map(|(family, _)| format!("{family}/"))
         .collect();
-    // A name may be meant without its family, or a family alone.
+    // The user may give a name without its family, or a family alone.
     let bare = |name: &'static str| name.split_once('/').map_or(name, |(_, bare)| bare);
     let names = all.iter().flat_map(|check| [check.name, bare(check.name)]);
     let known = names.chain(families.iter().map(String::as_str));
     let mut error = Error::unknown("check", text, known);
     if let Error::UnknownName { near, .. } = &mut error {
         if near.len() > all.len() {
-            // All of them: none is near.
+            // All families, because none is similar.
             *near = families;
         } else {
             near.truncate(2 * MOST);
@@ -65,7 +65,7 @@ struct Listed {
     reason: &'static str,
 }
 
-/// Prints the checks with what they need and where their tolerances come from.
+/// Prints the checks with their requirements and the sources of their tolerances.
 pub fn list(checks: &[&Check], json: bool) -> Result<()> {
     let listed: Vec<Listed> = (checks.iter())
         .map(|check| Listed {
@@ -94,7 +94,7 @@ pub fn list(checks: &[&Check], json: bool) -> Result<()> {
     Ok(())
 }
 
-/// Prints the documents that an engine is given.
+/// Prints the documents that the checks give an engine.
 pub fn scenes(checks: &[&Check], engine: &dyn Backend) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
     for check in checks {

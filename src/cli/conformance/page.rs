@@ -6,7 +6,7 @@ use asid_report::page::{Cell, Column, Page, Section, Table, Tone};
 use super::cell::{cell, limit};
 use super::result::{ConformanceResult, Count, Engine};
 
-/// The page: each engine in a sentence, what is wrong, then family after family.
+/// The page: each engine in a sentence, then failures, then the families of checks.
 pub fn html(result: &ConformanceResult, command: &str) -> String {
     let total = Count::of(result.rows.iter());
     let (badge, tone) = match (total.fail, total.known_deviation) {
@@ -74,7 +74,7 @@ pub fn html(result: &ConformanceResult, command: &str) -> String {
     .html()
 }
 
-/// Names in a row: `a`, `a and b`, `a, b and c`.
+/// Joins names: `a`, `a and b`, `a, b and c`.
 fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     match &names[..] {
@@ -152,7 +152,7 @@ fn tally(count: Count) -> Cell {
     }
 }
 
-/// The checks of a family: a row a check, a column an engine.
+/// The checks of a family: one row a check, one column an engine.
 fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Option<Table> {
     let of = |check: &str, engine: &str| {
         let mut rows = result.rows.iter();
@@ -202,7 +202,7 @@ fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Opti
     any.then_some(table)
 }
 
-/// The rows of one outcome, with what is known about each.
+/// The rows of one outcome, with the details of each.
 fn listed(
     result: &ConformanceResult,
     outcome: Outcome,
@@ -239,7 +239,7 @@ fn listed(
     Some(Section::new(title).lead(lead).table(table))
 }
 
-/// What each engine does not claim, and what is not asked of it for that.
+/// The capabilities that each engine does not claim, and the checks that are skipped for it.
 fn not_claimed(result: &ConformanceResult) -> Section {
     let mut table = Table::new(vec![
         Column::text("engine"),

@@ -1,4 +1,4 @@
-//! What a call of `asid conformance` found, and whether it is good.
+//! The result of a call of `asid conformance`, and whether it is good.
 
 use anyhow::Result;
 use asid_conformance::{Outcome, Row};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::cli::result::Program;
 
-/// What is said of an engine beside its rows.
+/// What is known of an engine besides its rows.
 #[derive(Serialize)]
 pub struct Engine {
     pub name: String,
@@ -19,7 +19,7 @@ pub struct Engine {
     pub count: Count,
 }
 
-/// Rows of an engine by outcome.
+/// Number of an engine's rows by outcome.
 #[derive(Clone, Copy, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct Count {
@@ -53,7 +53,7 @@ pub struct ConformanceResult {
     pub versions: Program,
 }
 
-/// An engine's rows in numbers.
+/// The counts of an engine's rows as a sentence.
 pub fn sentence(engine: &Engine) -> String {
     let count = engine.count;
     format!(
@@ -62,7 +62,7 @@ pub fn sentence(engine: &Engine) -> String {
     )
 }
 
-/// An error where a row fails.
+/// Returns an error if a row fails.
 pub fn verdict(result: &ConformanceResult) -> Result<()> {
     let failing: Vec<&Row> = result.rows.iter().filter(|row| row.is_failure()).collect();
     if failing.is_empty() {

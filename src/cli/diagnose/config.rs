@@ -73,7 +73,8 @@ pub struct Config {
     /// Whether the diagnosis is repeated on simulated logs, for as long as `minutes` allows.
     #[serde(default)]
     calibrate: bool,
-    /// Probability at which chance may accuse a machine that lacks nothing; a larger one finds smaller effects.
+    /// Probability at which chance may accuse a machine that lacks nothing; a larger one finds
+    /// smaller effects.
     #[serde(default = "false_alarms")]
     false_alarms: f64,
     /// Effects of the catalogue that are left out, by name.
@@ -101,18 +102,18 @@ pub enum RunLogs {
 }
 
 impl RunLogs {
-    /// Whether logs of exploration are among them.
+    /// Whether it includes logs of exploration.
     pub fn exploration(self) -> bool {
         self != Self::Attempt
     }
 
-    /// Whether logs of the attempt are among them.
+    /// Whether it includes logs of the attempt.
     pub fn attempt(self) -> bool {
         self != Self::Exploration
     }
 }
 
-/// Keys that are a diagnosis' own; where a task is run, the others are that run's.
+/// Keys of the diagnosis itself. Where a task is run, all other keys belong to that run.
 const OWN: [&str; 19] = [
     "study",
     "task",
@@ -135,17 +136,17 @@ const OWN: [&str; 19] = [
     "preset",
 ];
 
-/// Time limit where none is given, min: most machines have their whole answer within a minute, and who waits for it would rather know
-/// by then what is known.
+/// Default time limit, min. Most machines have their whole answer within a minute. A user who still
+/// waits prefers the partial result.
 pub const MINUTES: f64 = 1.5;
 
-/// Rate of false alarms where none is stated.
+/// Default rate of false alarms.
 fn false_alarms() -> f64 {
     FALSE_ALARMS
 }
 
 impl Config {
-    /// The settings of a study where nothing but the configuration file and `--set` says more.
+    /// The settings of a study from the configuration file and `--set` alone.
     pub fn of_study(study: &Path, common: &Common) -> Result<Self> {
         let mut config = parsed::<Self>(given(common)?)?;
         config.study = Some(study.to_owned());
@@ -156,8 +157,10 @@ impl Config {
         Ok(config)
     }
 
-    /// The configuration file, `--set`, then the command line; and apart from it the settings of
-    /// the task's runs, where the task is to be run.
+    /// The settings from the configuration file, `--set` and the command line, in rising
+    /// precedence.
+    ///
+    /// Where the task is to be run, the settings of its runs are returned separately.
     pub fn resolve(arguments: &Arguments) -> Result<(Self, Option<toml::Table>)> {
         let common = &arguments.common;
         let mut table = given(common)?;
@@ -195,7 +198,7 @@ impl Config {
             let levels = toml::Table::try_from(&config.difficulty)?;
             of_run.insert("difficulty".into(), levels.into());
         }
-        // Those that the file names are among those that were loaded.
+        // The loaded plugins include those that the file names.
         config.plugins = recorded(used(&[file_of::<BackendEntry>(&config.backend)]));
         config.runs = arguments.runs.or(config.runs);
         config.experiments = arguments.experiments.or(config.experiments);
@@ -257,13 +260,14 @@ impl Config {
     }
 }
 
-/// Runs whose logs are diagnosed where nothing is said: four to fit to, two held out.
+/// Default number of runs whose logs are diagnosed: four to fit, two held out.
 const RUNS: usize = 6;
-/// Seeds that the task is tried with where nothing is said.
+/// Default number of seeds with which the task is tried.
 const SEEDS: u64 = 5;
 
-/// The engine that is used where none is named: the first built in that computes in double
-/// precision, for which replays of logs are smooth in every parameter; else the first.
+/// The default engine: the first built-in one with double precision, else the first.
+///
+/// In double precision, replays of logs are smooth in every parameter.
 pub fn default_backend() -> String {
     let all = registry::all::<BackendEntry>();
     let double = |entry: &&&BackendEntry| {

@@ -1,4 +1,4 @@
-//! A diagnosis under way: bars, rankings as they stand, and when it is to end.
+//! A running diagnosis: bars, current rankings, and its end.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,22 +12,24 @@ use signal_hook::consts::SIGINT;
 use super::super::interrupt::INTERRUPTED;
 use super::super::progress::Bars;
 
-/// Share of the time limit after which nothing further is searched. Larger: more is tried, and less time is left for a fit of the values.
+/// Share of the time limit after which the search takes up nothing new. A larger share tries more
+/// and leaves less time for fitting values.
 const SEARCHING: f64 = 0.75;
-/// Share of the time limit after which the values of what was found are not fitted to whole replays any further: last replays and the
-/// report take the rest (5 to 15 % of the time of diagnoses of 5 s to a minute).
+/// Share of the time limit after which fits to whole replays end. The last replays and the report
+/// take the rest (5 to 15 % of the time of diagnoses of 5 s to a minute).
 const FITTING: f64 = 0.87;
-/// Rows of a ranking that are printed.
+/// Number of rows of a ranking that are printed.
 const ROWS: usize = 5;
-/// Characters of a name that are printed: a group of many joints is long.
+/// Characters of a name that are printed; the name of a group of many joints is long.
 const WIDEST: usize = 90;
 
-/// Progress on standard error. It ends the work at a time limit or at the first Ctrl-C; a second one ends the process at once.
+/// Progress on standard error, which ends the work at a time limit or at the first Ctrl-C. A second
+/// Ctrl-C ends the process at once.
 pub struct Live {
     bars: Bars,
     quiet: bool,
     begun: Instant,
-    /// When the search ends, and the fits.
+    /// End times of the search and of the fits.
     until: [Option<Instant>; 2],
     interrupted: Arc<AtomicBool>,
     told: AtomicBool,
@@ -35,7 +37,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Begins now; `minutes` is the time limit.
+    /// Starts the clock; `minutes` is the time limit.
     pub fn new(quiet: bool, minutes: Option<f64>) -> Self {
         let begun = Instant::now();
         let until = |share: f64| {
@@ -53,11 +55,11 @@ impl Live {
         }
     }
 
-    /// From here on the first Ctrl-C ends the search and a second one the process.
+    /// From now on the first Ctrl-C ends the search, and a second one ends the process.
     pub fn watch(&self) -> Result<()> {
         let failed = |e| Error::Failed(format!("cannot watch for signals: {e}"));
         let flag = || Arc::clone(&self.interrupted);
-        // In this order: the first signal finds the flag down, and raises it.
+        // The order matters: the first signal finds the flag clear, then sets it.
         signal_hook::flag::register_conditional_shutdown(SIGINT, INTERRUPTED, flag())
             .map_err(failed)?;
         signal_hook::flag::register(SIGINT, flag()).map_err(failed)?;
@@ -68,7 +70,7 @@ impl Live {
         self.until[end].is_some_and(|until| Instant::now() >= until)
     }
 
-    /// Time so far, s.
+    /// Elapsed time, s.
     pub fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
     }

@@ -1,8 +1,7 @@
-//! A task in its simulated real world: where the logs of a diagnosis come from, and where its
-//! answer is tried.
+//! A task in its simulated real world: the source of a diagnosis' logs, and the test of its answer.
 //!
-//! The machine is one: its hidden truth is the same in every run. Start poses, trackers'
-//! noise and wear are drawn anew from seed to seed.
+//! There is a single machine, whose hidden truth is the same in every run. Start poses, trackers'
+//! noise and wear are drawn anew for each seed.
 
 use anyhow::Result;
 use asid_algorithms::explore::{Discriminating, Rival};
@@ -19,7 +18,7 @@ use super::super::run::pipeline;
 use super::super::session::Session;
 use super::config::{Config, Logs, RunLogs};
 
-/// A task, its machine, and how often it is run.
+/// A task, its machine, and the number of runs.
 pub struct Machine {
     task: String,
     common: Common,
@@ -30,26 +29,25 @@ pub struct Machine {
     logs: RunLogs,
 }
 
-/// Episodes that tell explanations apart.
+/// Episodes that discriminate between explanations.
 pub struct Experiments {
     /// Their logs.
     pub logs: Logs,
-    /// What they were for, in words.
+    /// Text on their purpose.
     pub what: String,
 }
 
-/// Explanations that are told apart, at most.
+/// Largest number of explanations that are discriminated.
 const RIVALS: usize = 3;
-/// Probability that a rival counts with at least: what seems out of the question may be only
-/// for these data.
+/// Least weight of a rival: an explanation that seems improbable may be so only on these data.
 const LEAST: f64 = 0.1;
-/// Seeds of the experiments begin so far from those of the runs.
+/// Offset between the seeds of the experiments and those of the runs.
 const APART: u64 = 1000;
 
-/// The most probable explanations as simulators with the values that were fitted.
+/// The most probable explanations, as simulators with their fitted values.
 fn rivals(work: &Work) -> Result<Vec<Rival>> {
     let hypotheses = work.judgement.hypotheses.iter();
-    // A set that was screened only has no values to play with.
+    // A set that was only screened has no fitted values to play with.
     let fitted = hypotheses.filter(|h| h.found.is_some() || h.labels.is_empty());
     fitted
         .take(RIVALS)
@@ -87,7 +85,7 @@ pub struct Run {
 }
 
 impl Machine {
-    /// The machine that the settings describe: `of_run` are those of the task's runs.
+    /// The machine that the settings describe; `of_run` are those of the task's runs.
     pub fn new(
         config: &Config,
         of_run: toml::Table,
@@ -125,7 +123,7 @@ impl Machine {
         Session::open(&self.task, &common, &self.algorithms, worlds)
     }
 
-    /// The settings of its runs, resolved.
+    /// The resolved settings of its runs.
     pub fn settings(&self) -> Result<toml::Table> {
         let config = self.session(0, &self.worlds)?.config;
         Ok(toml::Table::try_from(&config)?)
@@ -147,7 +145,7 @@ impl Machine {
             .collect()
     }
 
-    /// Runs with the model as it is: those that are diagnosed, and those that are counted.
+    /// Runs with the model as given: those that are diagnosed, and those that are counted.
     pub fn before(&self, diagnosed: bool, progress: &dyn Progress) -> Result<Vec<Run>> {
         let n = if diagnosed {
             self.seeds.max(self.runs as u64)
@@ -160,7 +158,7 @@ impl Machine {
         Ok(runs)
     }
 
-    /// The logs of the first runs, of which the last third is held out.
+    /// The logs of the first runs; the last third is held out.
     pub fn logs(&self, runs: &[Run]) -> Logs {
         let held = (self.runs / 3).max(1);
         let mut logs: Logs = (Vec::new(), Vec::new());
@@ -179,8 +177,9 @@ impl Machine {
         logs
     }
 
-    /// Plays `n` episodes that the most probable explanations expect to differ in most; of them the
-    /// last third is held out. `None` where there is a single explanation.
+    /// Plays `n` episodes in which the predictions of the most probable explanations differ most.
+    ///
+    /// The last third is held out. `None` where there is a single explanation.
     pub fn tell_apart(
         &self,
         work: &Work,
@@ -218,8 +217,8 @@ impl Machine {
         Ok(Some(Experiments { logs, what }))
     }
 
-    /// The task in the real world with the model as it is, with the effects of a verdict added
-    /// to it, and without what was added to the real world.
+    /// Compares the task in three settings: in the real world with the model as given, there with
+    /// the verdict's effects added to it, and in a real world without its effects.
     pub fn compare(
         &self,
         before: &[Run],

@@ -6,7 +6,7 @@ use asid_results::diagnosis::DiagnosisResult;
 use asid_results::naming::grouped;
 use asid_results::trace::DiagnosisTrace;
 
-/// The answer on the terminal.
+/// The answer as lines for the terminal.
 pub fn lines(
     (result, trace): (&DiagnosisResult, &DiagnosisTrace),
     engine: &str,

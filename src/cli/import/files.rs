@@ -15,16 +15,16 @@ use super::super::machine::Subject;
 use super::super::output::write_text;
 use super::Imported;
 
-/// Parts that a single episode is cut into, the last of which is held out.
+/// Number of parts into which a single episode is cut; the last part is held out.
 const PARTS: usize = 3;
 
-/// What is written.
+/// What to write.
 pub(super) struct Files<'a> {
     /// The machine.
     pub subject: &'a Subject,
-    /// The model's file as it was named.
+    /// The model's file, as named by the user.
     pub given: &'a Path,
-    /// Whether the model had no sensors, and has them now.
+    /// Whether the model had no sensors and got them here.
     pub bare: bool,
     /// Kind of the logs, and their topics.
     pub settings: &'a LogSettings,
@@ -32,7 +32,7 @@ pub(super) struct Files<'a> {
     pub proposal: &'a Proposal,
     /// The episodes.
     pub imported: &'a [Imported],
-    /// Whether the episodes are written in place of references.
+    /// Whether to write the episodes instead of references.
     pub copy: bool,
 }
 
@@ -49,12 +49,12 @@ struct LogPart<'a> {
 }
 
 impl Files<'_> {
-    /// Whether there is one episode, which is cut into parts: what is fitted cannot be held out.
+    /// Whether a single episode is cut into parts: fitted data cannot be held out.
     fn is_cut(&self) -> bool {
         self.imported.len() == 1
     }
 
-    /// How many episodes the study has.
+    /// Number of episodes in the study.
     pub(super) fn count(&self) -> usize {
         if self.is_cut() {
             PARTS
@@ -63,7 +63,7 @@ impl Files<'_> {
         }
     }
 
-    /// How many of them are held out.
+    /// Number of episodes that are held out.
     pub(super) fn held_out(&self) -> usize {
         if self.is_cut() {
             1
@@ -72,7 +72,7 @@ impl Files<'_> {
         }
     }
 
-    /// Writes the files into `folder`, which will be `home`.
+    /// Writes the files into `folder`, whose final path is `home`.
     pub(super) fn write(&self, folder: &Path, home: &Path, page: &str) -> Result<()> {
         let model = if self.bare {
             let backend = &*self.subject.backend;
@@ -110,7 +110,7 @@ impl Files<'_> {
         write_text(&folder.join("import.html"), page)
     }
 
-    /// The logs where they are.
+    /// References to the logs where they are.
     fn references(&self, home: &Path) -> (Vec<String>, Vec<String>) {
         let names = |test: bool| -> Vec<String> {
             let chosen = self.imported.iter().filter(|i| i.test == test);
@@ -119,7 +119,7 @@ impl Files<'_> {
         (names(false), names(true))
     }
 
-    /// The episodes as files of their own.
+    /// Copies of the episodes as files.
     fn copies(&self, folder: &Path) -> Result<(Vec<String>, Vec<String>)> {
         let (mut train, mut test) = (Vec::new(), Vec::new());
         if self.is_cut() {
@@ -142,7 +142,7 @@ impl Files<'_> {
     }
 }
 
-/// The way to a log, which may be an episode of a dataset.
+/// The path to a log from the study, with the episode of a dataset.
 fn reference(home: &Path, log: &Path) -> String {
     let (file, episode) = asid_logs::open::split(log);
     let way = way(home, &file).display().to_string();

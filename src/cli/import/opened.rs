@@ -1,4 +1,4 @@
-//! The logs of an import, as they were recorded.
+//! The logs of an import, as recorded.
 
 use std::path::{Path, PathBuf};
 
@@ -6,11 +6,14 @@ use anyhow::Result;
 use asid_core::Error;
 use asid_logs::{LogFormat, LogSettings, Opener, RawLog};
 
-/// A log with its path, and whether it is held out.
+/// Path and log, and whether it is held out.
 pub(super) type Opened = (PathBuf, RawLog, bool);
 
-/// The logs of `fitted` and those of `held_out`, of which `topics` are read, each with its path and whether it is held out; and the kind that
-/// they are of. Without `held_out` the last third is held out.
+/// Opens the logs of `fitted` and `held_out`, reading the given `topics`, and returns their kind
+/// too.
+///
+/// Each log comes with its path and whether it is held out. Without `held_out` the last third is
+/// held out.
 ///
 /// # Errors
 /// When a log cannot be read, is named twice, or is of another kind than the others.
@@ -56,7 +59,8 @@ pub(super) fn open(
     Ok((all, settings))
 }
 
-/// Refuses a log that is there already, by whatever way it is named: its copy would be fitted and held out, or counted twice.
+/// Refuses a log that is already in the list, whatever path names it. It would be both fitted and
+/// held out, or counted twice.
 fn refuse_twice(all: &[Opened], own: &Path, test: bool) -> Result<()> {
     let place = place(own);
     match all.iter().find(|(path, ..)| self::place(path) == place) {
@@ -69,7 +73,7 @@ fn refuse_twice(all: &[Opened], own: &Path, test: bool) -> Result<()> {
     }
 }
 
-/// Where a log is: its file without links and dots, and the episode in it.
+/// Identity of a log: its canonical file, and the episode in it.
 fn place(path: &Path) -> (PathBuf, Option<usize>) {
     let (file, episode) = asid_logs::open::split(path);
     (file.canonicalize().unwrap_or(file), episode)

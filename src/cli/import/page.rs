@@ -8,7 +8,7 @@ use super::Imported;
 use super::files::Files;
 use super::table::cells;
 
-/// Points of a line that are drawn at most: a page of them stays below some MB.
+/// Largest number of points in a drawn line, which keeps a page below some MB.
 const DRAWN: usize = 1500;
 
 /// The page.
@@ -70,7 +70,8 @@ fn mapping(proposal: &Proposal, notes: &[String]) -> Section {
     section
 }
 
-/// One figure a sensor of the first episode, with the command of its joint where that is a position.
+/// One figure for each sensor of the first episode, with the command of its joint where that is a
+/// position.
 fn pictures(study: &Files<'_>) -> Section {
     let Some(first) = study.imported.first() else {
         return Section::new("Over time");
@@ -129,7 +130,7 @@ fn pictures(study: &Files<'_>) -> Section {
         .figures(figures)
 }
 
-/// Every so many points, so that a line has no more than are drawn.
+/// Every n-th point, so that a line has no more than [`DRAWN`] points.
 fn thinned(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let every = points.len().div_ceil(DRAWN).max(1);
     points.into_iter().step_by(every).collect()

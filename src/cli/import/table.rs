@@ -25,7 +25,7 @@ struct Row<'a> {
     reasons: &'a [String],
 }
 
-/// How a column is read, in short.
+/// How a column is read, in brief.
 fn reading(found: &Match) -> String {
     let Some(m) = &found.mapping else {
         return String::new();
@@ -62,10 +62,10 @@ pub(super) fn cells(found: &Match) -> [String; 5] {
     ]
 }
 
-/// Columns that are named at most; the rest is counted.
+/// Largest number of columns that are named; the rest is counted.
 const NAMED: usize = 12;
 
-/// Names of columns in a row, many of them in part; `None` where there are none.
+/// Names of columns in a row, abbreviated if there are many; `None` for an empty list.
 pub(super) fn listed(names: &[String]) -> Option<String> {
     let mut all: Vec<String> = names.iter().take(NAMED).cloned().collect();
     if names.len() > NAMED {
@@ -74,7 +74,7 @@ pub(super) fn listed(names: &[String]) -> Option<String> {
     (!all.is_empty()).then(|| all.join(", "))
 }
 
-/// Prints the mapping as a table, then where the stamps are and which columns nothing is read from.
+/// Prints the mapping as a table, then the source of the time stamps and the unused columns.
 pub(super) fn show(proposal: &Proposal, stamps: Option<&str>) -> Result<()> {
     let head = ["quantity", "column", "read as", "Hz", "values", "because"];
     let mut rows = vec![head.map(str::to_owned)];

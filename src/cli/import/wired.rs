@@ -1,5 +1,7 @@
-//! The proposed mapping, tried in the model: sensors that some logs lack or that never change are said, and what the check of wiring
-//! finds is put right before the study is written.
+//! Tries the proposed mapping in the model.
+//!
+//! Sensors that some logs lack or that never change are reported. Faults that the wiring check
+//! finds are corrected before the study is written.
 
 use std::collections::BTreeMap;
 
@@ -18,10 +20,10 @@ use super::super::machine::Subject;
 use super::super::session::backend;
 use super::{Imported, episode};
 
-/// A fault that may as well be an effect: it is not mended before the diagnosis has seen it.
+/// A fault that may just as well be an effect, so it is left to the diagnosis.
 const CLOCK: &str = "wiring-clock";
 
-/// The lines that mend a fault.
+/// The lines that correct a fault.
 #[derive(Deserialize)]
 struct Lines {
     column: Vec<ColumnMapping>,
@@ -51,8 +53,9 @@ fn study(subject: &Subject, imported: &[Imported], proposal: &Proposal) -> Study
     }
 }
 
-/// Looks at the sensors and the wiring of the episodes, puts what is found into the proposal and the episodes, and says it; `whole` is all
-/// logs as one.
+/// Checks the sensors and the wiring of the episodes; `whole` is all logs as one.
+///
+/// Corrections go into the proposal and the episodes. Returns a sentence for each finding.
 pub(super) fn look(
     subject: &Subject,
     imported: &mut [Imported],

@@ -1,4 +1,4 @@
-//! `asid explore STUDY`: the motion of any machine that tells the most, as a command file.
+//! `asid explore STUDY`: the most informative motion of any machine, as a command file.
 
 mod unknown;
 
@@ -149,7 +149,7 @@ pub fn explore(
     Ok(())
 }
 
-/// The log that the simulator expects, without noise; its first row is the first that was recorded.
+/// The log that the simulator expects, without noise. Its first row is the first recorded one.
 fn predicted(subject: &Subject, found: &Designed, signals: &[Signal], period: f64) -> Episode {
     let layout = &subject.plant.layout;
     let mut episode = Episode::of_commands(layout, found.commands.clone(), period);
@@ -169,7 +169,7 @@ fn predicted(subject: &Subject, found: &Designed, signals: &[Signal], period: f6
     episode
 }
 
-/// A deviation as a share of what it is measured by, in words.
+/// Text of a deviation relative to its reference.
 pub fn relative(deviation: f64, reference: f64) -> String {
     if reference == 0.0 {
         figure(deviation)
@@ -179,7 +179,7 @@ pub fn relative(deviation: f64, reference: f64) -> String {
     }
 }
 
-/// What is known of an unknown before and after the motion, and how often it is to be played for `wanted` percent.
+/// Text on an unknown before and after the motion, with the repeats needed for `wanted` percent.
 fn told(u: &UnknownResult, wanted: f64) -> String {
     let to = |deviation: f64| relative(deviation, u.reference);
     let of = match (u.reference == 0.0, u.value == 0.0) {
@@ -209,7 +209,7 @@ fn told(u: &UnknownResult, wanted: f64) -> String {
     format!("{}: {known}; {enough} for the wanted {wanted:.1} %", u.name)
 }
 
-/// What contact does to what is known of an unknown, where it limits that.
+/// Text on how contact limits what the motion tells of an unknown; `None` where it does not.
 fn limited(u: &UnknownResult) -> Option<String> {
     let by_slopes = relative(u.by_slopes?, u.reference);
     Some(format!(

@@ -19,10 +19,11 @@ use super::Subject;
 use crate::cli::export::create;
 use crate::cli::result::SCHEMA;
 
-/// Relative difference of a value as written and as compiled that is rounding in the engine's own derivations.
+/// Relative difference between a written and a compiled value that counts as rounding in the
+/// engine's derivations.
 const ROUNDING: f64 = 1e-6;
 
-/// What is asked for.
+/// The request.
 pub struct Request<'a> {
     /// Study or model.
     pub path: &'a Path,
@@ -62,11 +63,11 @@ struct ExportResult {
     gap: Vec<GapRow>,
 }
 
-/// Writes the document and tells how well it says the model.
+/// Writes the document and reports how exactly it reproduces the model.
 pub fn export(request: &Request<'_>) -> Result<()> {
     let subject = Subject::open(request.path, request.backend)?;
     if request.out.exists() {
-        // Before any work.
+        // Check this before any work.
         return create(request.out, "");
     }
     let folder = request.out.parent().unwrap_or(Path::new(""));
@@ -137,7 +138,8 @@ impl Subject {
     /// A plain document on the engine of another subject.
     fn of_scene(scene: Scene, like: &Self) -> Result<Self> {
         let model = like.backend.load(&scene)?;
-        // The reader of documents knows no polynomials; the tree is that of the source unless joints were added.
+        // The reader of documents does not handle polynomial joint couplings. The tree is that of
+        // the source unless joints were added.
         let mut plant = match Plant::of(&scene) {
             Ok(plant) => plant,
             Err(_) if model.layout().nq == like.plant.layout.nq => like.plant.clone(),
@@ -160,11 +162,12 @@ impl Subject {
     }
 }
 
-/// Values that the document, compiled, does not have, a sentence each.
+/// Values that the compiled document does not reproduce, one sentence each.
 fn values_that_differ(written: &PlainModel, exported: &Subject) -> Result<Vec<String>> {
     let mut sentences = Vec::new();
     for (target, wanted) in &written.values {
-        // What is part of another element now (the mass of a geom in a body's inertia) is told by the replays.
+        // A value that is now part of another element (a geom's mass in a body's inertia) is
+        // checked by the replays.
         let Ok(found) = exported.model.nominal(target) else {
             continue;
         };
@@ -182,7 +185,7 @@ fn values_that_differ(written: &PlainModel, exported: &Subject) -> Result<Vec<St
     Ok(sentences)
 }
 
-/// The gaps of both models.
+/// The replay gaps of both models.
 fn gaps(study: &Study, refined: &Subject, exported: &Subject) -> Result<Vec<GapRow>> {
     let mut rows = Vec::new();
     for (logs, episodes) in [("fitted", &study.train), ("held out", &study.test)] {
@@ -209,7 +212,8 @@ fn gaps(study: &Study, refined: &Subject, exported: &Subject) -> Result<Vec<GapR
     Ok(rows)
 }
 
-/// A log whose given start has the places of another layout, by the names of the joints.
+/// A log whose given start is rearranged to the `qpos` and `qvel` of another layout, by joint
+/// names.
 fn with_places(episode: &Episode, from: &Layout, to: &Layout) -> Result<Episode> {
     let mut episode = episode.clone();
     if from.nq == to.nq {

@@ -92,7 +92,7 @@ impl GapResult {
 }
 
 impl Config {
-    /// The settings: a file, then single values, then options.
+    /// Resolves the settings: a file, then single values, then options.
     pub fn resolve(path: &Path, model: Option<&Path>, common: &Common) -> Result<Self> {
         let mut table = given(common)?;
         table.insert("study".into(), path.display().to_string().into());
@@ -105,7 +105,7 @@ impl Config {
     }
 }
 
-/// Fits and writes the result; with another `model` in place of the study's own, where there is one.
+/// Fits and writes the result; `model` replaces the study's own where given.
 pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()> {
     let clock = Instant::now();
     let config = Config::resolve(path, model, common)?;
@@ -213,7 +213,7 @@ fn refined(subject: &Subject, parameters: &[Parameter], found: &Identified) -> R
     }
     let file = std::path::PathBuf::from(subject.source.scene.name());
     let file = file.canonicalize().unwrap_or(file);
-    // A value of an effect belongs to the effect.
+    // An effect keeps its own values.
     let mut effects = subject.source.effects.clone();
     values.retain(|(target, value)| {
         let own = effects

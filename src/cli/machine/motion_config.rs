@@ -1,4 +1,4 @@
-//! The settings of a motion's design: what is unknown, what must be kept, how it is searched.
+//! The settings of a motion's design: unknowns, limits and search.
 
 mod options;
 mod text;
@@ -19,20 +19,22 @@ use crate::cli::settings::{given, parsed, wrong};
 pub use options::Options;
 use text::{maybe_name, name_and};
 
-/// Length of a motion where nothing is said, s: some swings of an arm.
+/// Default length of a motion, s: some swings of an arm.
 const SECONDS: f64 = 5.0;
 
-/// Period of commands and readings where nothing is said, s: that of most robots' loggers.
+/// Default period of commands and readings, s: that of most robots' loggers.
 const PERIOD: f64 = 0.01;
 
-/// Time to settle before a motion, and to come to rest behind it, s: some times an arm's slowest decay.
+/// Time to settle before a motion, and to come to rest after it, s: several times an arm's slowest
+/// decay.
 const SETTLE: f64 = 1.0;
 
-/// Physics steps of a motion, with the time to settle and the rest, at most. The answer is looked at after each of them in a batch of 256 plays,
-/// which with 20 recorded numbers each takes 4 GB; and 100 000 steps of 2 ms are 200 s, many swings of any machine.
+/// Largest number of physics steps of a motion, with the time to settle and the rest. The state is
+/// recorded after each step in a batch of 256 plays, which with 20 numbers each takes 4 GB. 100 000
+/// steps of 2 ms are 200 s, many swings of any machine.
 const MOST_STEPS: f64 = 1e5;
 
-/// Relative precision that repeats are counted for.
+/// Relative precision for which repeats are counted.
 const PRECISION: f64 = 0.01;
 
 /// `config.toml`.
@@ -158,7 +160,7 @@ impl Config {
     }
 
     fn check(&self) -> Result<()> {
-        // A motion of a single command has nothing that can be searched for.
+        // A motion of a single command leaves nothing to search.
         if self.period > 0.5 * self.seconds {
             return Err(wrong(
                 "period",
@@ -201,7 +203,7 @@ impl Config {
         Ok(())
     }
 
-    /// Refuses a motion that takes more physics steps than can be played at once.
+    /// Refuses a motion with more physics steps than can be played at once.
     ///
     /// # Errors
     /// When there are more than [`MOST_STEPS`].
@@ -221,9 +223,9 @@ impl Config {
         ))
     }
 
-    /// The unknowns that are sought, then nuisance entries.
+    /// The unknowns to identify, then nuisance entries.
     pub fn parameters(&self, subject: &Subject) -> Result<Vec<Parameter>> {
-        // Before any work.
+        // Check this before any work.
         self.check_steps(subject.plant.layout.timestep)?;
         let mut all: Vec<Parameter> = subject
             .study
@@ -271,12 +273,13 @@ impl Config {
         Ok(all)
     }
 
-    /// Number of unknowns that are sought.
+    /// Number of unknowns to identify.
     pub fn sought(&self, subject: &Subject) -> usize {
         subject.study.as_ref().map_or(0, |s| s.parameters.len()) + self.unknown.len()
     }
 
-    /// The values about which is designed: the model's own where they lie in the range, else its middle.
+    /// The values at which the motion is designed: the model's own where they lie in the range,
+    /// else its middle.
     pub fn values(&self, subject: &Subject, parameters: &[Parameter]) -> Result<Vec<f64>> {
         parameters
             .iter()
@@ -288,7 +291,7 @@ impl Config {
             .collect()
     }
 
-    /// The limits that are asked for.
+    /// The requested limits.
     pub fn limits(&self) -> Result<LimitRequest> {
         let mut request = LimitRequest {
             rest: self.ends_at_rest.then_some(self.rest_speed),
@@ -322,7 +325,7 @@ impl Config {
     }
 }
 
-/// Refuses a range that lets one end of a drive's limits of force pass the other.
+/// Refuses a range in which one end of a drive's force limits could pass the other.
 fn ends_apart(
     subject: &Subject,
     all: &[Parameter],

@@ -1,4 +1,4 @@
-//! The page of a designed motion: what it tells, what it looks like, what it keeps.
+//! The page of a designed motion: what it tells, its course and its limits.
 
 use asid_report::page::{Column, Figure, Page, Section, Table, Tile, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
@@ -11,7 +11,7 @@ use super::explore::{ExploreResult, lines, relative};
 use crate::cli::result::figure;
 use crate::cli::run::command_line;
 
-/// Joints and actuators that are drawn at most: more are in the files.
+/// Largest number of joints and actuators that are drawn; the files hold all.
 const DRAWN: usize = 12;
 
 /// The page.

@@ -1,4 +1,4 @@
-//! What the readings of a machine are, and how noisy.
+//! The readings of a machine and their noise.
 
 use std::collections::BTreeMap;
 
@@ -12,9 +12,11 @@ use asid_sysid::dataset::Dataset;
 use super::Subject;
 use crate::cli::model::refine;
 
-/// Noise of a sensor by its kind where neither a study nor `--noise` says: what a common robot has (a 12-bit
-/// encoder is good to 4e-4 rad, its difference over 10 ms to 0.05 rad/s, a tracker to 1 mm and 5 mrad, a MEMS sensor to
-/// 0.01 rad/s and 0.1 m/s²); a hundredth of the unit elsewhere.
+/// Default noise of a sensor by its kind, where neither a study nor `--noise` gives it.
+///
+/// The values are those of a common robot. A 12-bit encoder is good to 4e-4 rad, and its difference
+/// over 10 ms to 0.05 rad/s. A tracker is good to 1 mm and 5 mrad, a MEMS sensor to 0.01 rad/s and
+/// 0.1 m/s². For other kinds it is a hundredth of the unit.
 fn usual_noise(kind: &str) -> f64 {
     match kind {
         "jointpos" | "tendonpos" | "actuatorpos" => 5e-4,
@@ -26,7 +28,7 @@ fn usual_noise(kind: &str) -> f64 {
     }
 }
 
-/// The same machine with a sensor at each hinge and slide, where it has no sensors at all.
+/// The same machine with a sensor at each hinge and slide, if it has no sensors at all.
 pub fn with_sensors(subject: Subject, notes: &mut Vec<String>) -> Result<Subject> {
     if !subject.plant.layout.sensors.is_empty() {
         return Ok(subject);

@@ -1,4 +1,5 @@
-//! What the search of a motion works on: a machine at rest, its unknowns and limits, and how far its commands may go.
+//! The setup of a motion search: a machine at rest, its unknowns and limits, and the amplitudes of
+//! its commands.
 
 use anyhow::Result;
 use asid_core::signal::Signal;
@@ -18,31 +19,32 @@ use super::{Subject, sensors};
 /// A machine at rest, ready for a search.
 pub struct Setup<'a> {
     subject: &'a Subject,
-    /// Plays motions, and looks at limits.
+    /// Plays motions and checks limits.
     pub player: Player<'a>,
-    /// The unknowns that are sought, then nuisance entries.
+    /// The unknowns to identify, then nuisance entries.
     pub parameters: Vec<Parameter>,
-    /// Number of unknowns that are sought.
+    /// Number of unknowns to identify.
     pub sought: usize,
-    /// Values about which is searched, in the parameters' units.
+    /// Values at which the motion is designed, in the parameters' units.
     pub values: Vec<f64>,
-    /// What the logs of a study tell; nothing without one.
+    /// Information from the logs of a study; zero without a study.
     pub known: Told,
     /// Sensors that are read, with their noise.
     pub signals: Vec<Signal>,
-    /// Physics steps of a frame.
+    /// Physics steps per frame.
     pub substeps: usize,
-    /// Commands under which the machine rests.
+    /// Commands at which the machine rests.
     pub base: Vec<f64>,
-    /// What a user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl<'a> Setup<'a> {
-    /// Puts a machine to rest and looks whether it keeps its limits there.
+    /// Brings a machine to rest and checks its limits there.
     ///
     /// # Errors
-    /// When a name of the configuration is unknown, the machine begins beyond a limit, or the engine fails.
+    /// When a name of the configuration is unknown, the machine begins beyond a limit, or the
+    /// engine fails.
     pub fn new(subject: &'a Subject, config: &Config, threads: usize) -> Result<Self> {
         let mut notes = Vec::new();
         let parameters = config.parameters(subject)?;
@@ -90,8 +92,11 @@ impl<'a> Setup<'a> {
         })
     }
 
-    /// Plays commands (`frames x nu`) on a true machine that a seed draws from the ranges, the same for all commands: its values, in
-    /// their units, what it did, and its log with noise.
+    /// Plays commands (`frames x nu`) on a simulated true machine, which a seed draws from the
+    /// ranges.
+    ///
+    /// The machine is the same for all commands. Returns its values in their units, its motion, and
+    /// its log with noise.
     ///
     /// # Errors
     /// As [`rehearse`].
@@ -123,10 +128,10 @@ impl<'a> Setup<'a> {
         self.substeps as f64 * self.subject.plant.layout.timestep
     }
 
-    /// Finds a motion.
+    /// Designs a motion.
     ///
     /// # Errors
-    /// When the configuration is off, nothing can move, or the engine fails.
+    /// When the configuration is wrong, nothing can move, or the engine fails.
     pub fn design(
         &mut self,
         config: &Config,
@@ -159,8 +164,9 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// The range of a joint, by index, where the document has one. The model's values go before the document's; an engine that cannot
-/// change a range has none.
+/// The range of a joint, by index, where the document has one.
+///
+/// The model's values take precedence over the document's, unless the engine cannot change a range.
 fn range_of(subject: &Subject, joint: usize) -> Option<[f64; 2]> {
     let [low, high] = subject.plant.joints[joint].range?;
     let name = &subject.plant.layout.joints[joint].name;
@@ -171,7 +177,8 @@ fn range_of(subject: &Subject, joint: usize) -> Option<[f64; 2]> {
     Some([end(0, low), end(1, high)]).filter(|[low, high]| low < high)
 }
 
-/// Commands under which the machine rests: the first keyframe's, else those of servos that hold the first state.
+/// Commands at which the machine rests: the first keyframe's, else those at which servos hold the
+/// first state.
 fn base_commands(subject: &Subject) -> Vec<f64> {
     let layout = &subject.plant.layout;
     if let Some(key) = layout.keyframes.first() {
@@ -187,8 +194,11 @@ fn base_commands(subject: &Subject) -> Vec<f64> {
         .collect()
 }
 
-/// How far each command may go from its base: half of what limits leave, whichever side is wider. Infinite for a drive that only the limits
-/// of its joint bound, 0 for one that nothing bounds.
+/// Largest distance of each command from its base: half of what the limits leave, on the wider
+/// side.
+///
+/// It is infinite for a drive that only its joint's limits bound, and 0 for one that nothing
+/// bounds.
 fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
     let reach = |range: Option<[f64; 2]>, base: f64| {
         range.map_or(f64::INFINITY, |[low, high]| {
@@ -218,7 +228,7 @@ fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
     each.collect()
 }
 
-/// Lets the machine come to rest before a motion, where it does.
+/// Lets the machine come to rest before a motion, if it does.
 fn settle(
     player: &mut Player<'_>,
     values: &[f64],

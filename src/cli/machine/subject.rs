@@ -1,4 +1,4 @@
-//! What a command on any machine is about: a study, or a model without logs.
+//! The subject of a command on any machine: a study, or a model without logs.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,27 +19,28 @@ use super::super::session::backend;
 pub struct Subject {
     /// Name for folders and pages.
     pub name: String,
-    /// File of the model, as it was given.
+    /// File of the model, as given.
     pub file: PathBuf,
     /// The model with its values and effects.
     pub source: RefinedModel,
-    /// Logs and unknowns, where there is a study.
+    /// Logs and unknowns, where a study is given.
     pub study: Option<Study>,
     /// The engine.
     pub backend: Box<dyn Backend>,
-    /// The model compiled, with values and effects.
+    /// The compiled model, with values and effects.
     pub model: Arc<dyn Model>,
-    /// The machine, with the layout that the engine gives it.
+    /// The machine, with the engine's layout.
     pub plant: Plant,
 }
 
 impl Subject {
-    /// Opens a study (a folder, or a TOML file with `train`), a refined model (any other TOML file) or an MJCF file.
+    /// Opens a study (a folder, or a TOML file with `train`), a refined model (any other TOML file)
+    /// or an MJCF file.
     pub fn open(path: &Path, engine: Option<&str>) -> Result<Self> {
         Self::open_with(path, engine, None)
     }
 
-    /// The same with another `model` in place of the study's own, where there is one.
+    /// As [`Subject::open`], with another `model` in place of the study's own.
     pub fn open_with(path: &Path, engine: Option<&str>, model: Option<&Path>) -> Result<Self> {
         let study = is_study(path)?.then(|| Study::read_with(path, model));
         let mut study = study.transpose()?;
@@ -81,7 +82,7 @@ impl Subject {
         })
     }
 
-    /// The study, where the command needs logs.
+    /// The study, for commands that need logs.
     pub fn needs_study(&self) -> Result<&Study> {
         self.study.as_ref().ok_or_else(|| {
             Error::File {
@@ -100,7 +101,8 @@ impl Subject {
     }
 }
 
-/// Takes those readings out of the first rows of a study's logs that follow a command from before the log.
+/// Removes from the first rows of a study's logs the readings that follow a command from before the
+/// log.
 fn open_first_rows(model: &dyn Model, plant: &Plant, study: &mut Study) -> Result<()> {
     let Some((_, episode)) = study.train.first() else {
         return Ok(());
@@ -112,7 +114,7 @@ fn open_first_rows(model: &dyn Model, plant: &Plant, study: &mut Study) -> Resul
     Ok(())
 }
 
-/// Whether a path names a study and no model.
+/// Whether a path names a study rather than a model.
 pub fn is_study(path: &Path) -> Result<bool> {
     if path.is_dir() {
         return Ok(true);
@@ -120,7 +122,7 @@ pub fn is_study(path: &Path) -> Result<bool> {
     if path.extension().is_none_or(|e| e != "toml") {
         return Ok(false);
     }
-    // What cannot be read or parsed is told of by the reader of studies.
+    // The reader of studies reports what cannot be read or parsed.
     let Ok(text) = std::fs::read_to_string(path) else {
         return Ok(true);
     };

@@ -1,13 +1,15 @@
-//! Folders in which a result is filled before it has its name, and what a process that was killed leaves of them.
+//! Folders in which a result is filled before it has its name, and what a process that was killed
+//! leaves of them.
 //!
 //! ```text
 //! .asid-UNIQUE/lock       locked as long as the process that fills it lives
 //! .asid-UNIQUE/content/   the result
-//! .asid-UNIQUE/moves      names that are being moved from `content` into a folder that was there before
+//! .asid-UNIQUE/moves      names being moved from `content` into a folder that existed before
 //! .asid-UNIQUE/replaced   a folder in whose place the result is put
 //! ```
 //!
-//! The lock tells what is left over from what is in use, across containers and machines, where numbers of processes repeat.
+//! The lock tells what is left over from what is in use, across containers and machines, where
+//! numbers of processes repeat.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -15,21 +17,21 @@ use std::path::{Path, PathBuf};
 
 use asid_comparison::store::unique;
 
-/// How the names of such folders begin.
+/// Prefix of such folders' names.
 const PREFIX: &str = ".asid-";
 const LOCK: &str = "lock";
 const CONTENT: &str = "content";
 const MOVES: &str = "moves";
 const REPLACED: &str = "replaced";
-/// What such a folder holds, in the order in which it is removed: the lock last, so that whatever a kill leaves of it [`clear`] knows for
-/// left over.
+/// Content of such a folder in the order of removal. The lock goes last, so that [`clear`]
+/// recognises whatever a kill leaves.
 const PARTS: [&str; 4] = [CONTENT, MOVES, REPLACED, LOCK];
 
-/// Attempts to make a folder, which [`clear`] of another process may take before it is locked, and to give it a name that another process
-/// may take first.
+/// Attempts to make a folder, which [`clear`] of another process may remove before it is locked.
+/// Also attempts to rename it, since another process may take the name first.
 const ATTEMPTS: usize = 10;
 
-/// A folder that is being filled; it is removed with what is left in it.
+/// A folder that is being filled; dropping it removes it with its content.
 pub struct Staging {
     root: PathBuf,
     /// Holds the lock.
@@ -37,7 +39,7 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Makes one beside what it will become.
+    /// Makes a staging folder beside its destination.
     pub fn new_in(folder: &Path) -> io::Result<Self> {
         let mut made = Self::try_new_in(folder);
         for _ in 1..ATTEMPTS {
@@ -54,7 +56,7 @@ impl Staging {
         fs::create_dir(&root)?;
         let filled = || -> io::Result<File> {
             let lock = File::create_new(root.join(LOCK))?;
-            // A file system without locks: what is left over there stays.
+            // Without locks in the file system, leftovers there stay.
             let _ = lock.lock();
             fs::create_dir(root.join(CONTENT))?;
             Ok(lock)
@@ -68,12 +70,12 @@ impl Staging {
         }
     }
 
-    /// What is filled.
+    /// The folder to fill.
     pub fn content(&self) -> PathBuf {
         self.root.join(CONTENT)
     }
 
-    /// Moves what it holds into a folder, in this order; a move that is cut short is undone by [`clear`].
+    /// Moves its content into a folder, in this order; [`clear`] undoes a move that was cut short.
     pub fn move_into(&self, folder: &Path, names: &[String]) -> io::Result<()> {
         let mut moves = File::create_new(self.root.join(MOVES))?;
         moves.write_all(names.join("\n").as_bytes())?;
@@ -84,7 +86,8 @@ impl Staging {
         Ok(())
     }
 
-    /// Gives what it holds the name of a folder. One that has the name goes as a whole: nobody sees a part of it there.
+    /// Renames its content to a folder. An existing folder of that name is replaced as a whole, so
+    /// that nobody sees a part of it.
     pub fn replace(&self, folder: &Path) -> io::Result<()> {
         let old = self.root.join(REPLACED);
         let mut tried = 0;
@@ -102,7 +105,7 @@ impl Staging {
                 let _ = fs::rename(&old, folder);
                 return Err(error);
             }
-            // Another process was quicker: its folder is replaced in turn.
+            // Another process was faster: replace its folder in turn.
             let _ = fs::remove_dir_all(&old);
         }
     }
@@ -114,7 +117,8 @@ impl Drop for Staging {
     }
 }
 
-/// Removes some parts of a folder, and the folder if it is empty then. What cannot be removed stays.
+/// Removes some parts of a folder, and the folder if it is then empty. What cannot be removed
+/// stays.
 fn remove(root: &Path, parts: &[&str]) {
     for part in parts.iter().map(|p| root.join(p)) {
         let _ = if part.is_dir() {
@@ -126,7 +130,8 @@ fn remove(root: &Path, parts: &[&str]) {
     let _ = fs::remove_dir(root);
 }
 
-/// Removes from a folder what processes left that were killed while they wrote into it. What cannot be removed stays.
+/// Removes from a folder what killed processes left while they wrote into it. What cannot be
+/// removed stays.
 pub fn clear(folder: &Path) {
     let entries = fs::read_dir(folder).into_iter().flatten();
     for root in entries.filter_map(|e| Some(e.ok()?.path())) {
@@ -134,11 +139,12 @@ pub fn clear(folder: &Path) {
         if !name.starts_with(PREFIX) || !root.is_dir() {
             continue;
         }
-        // One that was not locked yet holds nothing.
+        // A folder that was not locked yet is empty.
         if fs::remove_dir(&root).is_ok() {
             continue;
         }
-        // The lock is held until all is gone: a process that is about to take it would fill a folder that is being removed.
+        // Hold the lock until all is removed. Otherwise a process that is about to take it would
+        // fill a folder that is being removed.
         let Some(_lock) = left(&root) else {
             continue;
         };
@@ -147,13 +153,13 @@ pub fn clear(folder: &Path) {
     }
 }
 
-/// The lock, taken, where nobody holds it.
+/// Takes the lock if nobody holds it.
 fn left(root: &Path) -> Option<File> {
     let lock = File::open(root.join(LOCK)).ok()?;
     lock.try_lock().is_ok().then_some(lock)
 }
 
-/// Takes back what was moved already, where some of it was not.
+/// Removes files that were already moved, if other files were not moved.
 fn undo_moves(folder: &Path, root: &Path) {
     let unmoved = fs::read_dir(root.join(CONTENT)).is_ok_and(|mut all| all.next().is_some());
     let Ok(moves) = fs::read_to_string(root.join(MOVES)) else {
@@ -161,7 +167,7 @@ fn undo_moves(folder: &Path, root: &Path) {
     };
     for name in moves.lines().filter(|_| unmoved) {
         let (from, to) = (root.join(CONTENT).join(name), folder.join(name));
-        // What is still here was not moved: a file of that name is somebody else's.
+        // A file that is still here was not moved: a file of that name belongs to someone else.
         if from.exists() || Path::new(name).components().count() != 1 {
             continue;
         }
@@ -177,7 +183,7 @@ fn undo_moves(folder: &Path, root: &Path) {
 mod tests {
     use super::*;
 
-    /// A folder as a process leaves it that is killed after `moved` of two files.
+    /// A folder as left by a process that was killed after `moved` of two files.
     fn killed_after(moved: usize) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let staging = Staging::new_in(folder.path()).unwrap();
@@ -188,7 +194,7 @@ mod tests {
         for name in &["a.json", "result.json"][..moved] {
             fs::rename(staging.content().join(name), folder.path().join(name)).unwrap();
         }
-        // The lock goes with the process; the folder stays.
+        // The lock ends with the process; the folder stays.
         let copy = folder.path().join(format!("{PREFIX}dead"));
         fs::rename(&staging.root, &copy).unwrap();
         drop(staging);
@@ -213,8 +219,9 @@ mod tests {
         }
     }
 
-    /// Symptom: every other run that was killed as it began left a folder for good. Cause: it was killed as it removed one, whose lock
-    /// was gone before its content, so that nobody took it for left over.
+    /// Symptom: some runs that were killed as they began left a folder for good. Cause: the kill
+    /// came while they removed a folder. Its lock was gone before its content, so nobody recognised
+    /// it as left over.
     #[test]
     fn a_removal_that_was_cut_short_is_ended() {
         for removed in 0..=PARTS.len() {
@@ -232,8 +239,8 @@ mod tests {
         }
     }
 
-    /// Symptom: after a kill a case counted as answered and had no answer. Cause: the folder of the answer before was removed file by
-    /// file, and what says that it is done may stay to the last.
+    /// Symptom: after a kill a case counted as answered and had no answer. Cause: the folder of the
+    /// previous answer was removed file by file, and the file that marks it as done may go last.
     #[test]
     fn a_folder_is_replaced_as_a_whole_by_several_at_once() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! An algorithm with its settings: its defaults, then those of the task, then what is given.
+//! An algorithm with its settings: its defaults, overridden by the task's, then by the given ones.
 
 use anyhow::Result;
 use asid_core::Task;
@@ -17,9 +17,10 @@ pub struct Component {
     pub settings: Settings,
 }
 
-/// The algorithm of a section with all its settings. Settings in the file are
-/// those of the algorithm named there; another one on the command line starts
-/// from its defaults.
+/// The algorithm of a section with all its settings.
+///
+/// Settings in the file belong to the algorithm that the file names. Another algorithm on the
+/// command line starts from its defaults.
 pub fn component<T: ?Sized + 'static>(
     task: &dyn Task,
     table: &toml::Table,
@@ -50,7 +51,7 @@ where
     Ok(Component { name, settings })
 }
 
-/// Settings over their defaults, which say what kind of value each one is.
+/// Merges settings into their defaults, which determine the type of each value.
 pub fn merge(section: &str, into: &mut toml::Table, from: toml::Table) -> Result<()> {
     use toml::Value::{Boolean, Float, Integer, String, Table};
     for (key, value) in from {

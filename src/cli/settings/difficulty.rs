@@ -1,7 +1,7 @@
-//! How hard a task is: its own values, then a preset's, then single ones.
+//! How hard a task is: its own values, overridden by a preset's, then by single ones.
 //!
-//! A task is made harder before anything else is resolved, for its trackers' noise, its goal and its
-//! scene follow from it.
+//! The difficulty is applied before anything else is resolved, because noise, goal and scene follow
+//! from it.
 
 use std::collections::BTreeMap;
 
@@ -11,8 +11,9 @@ use asid_core::{Levels, Task};
 use super::table::{configured, numbers, section, set, text, wrong};
 use crate::cli::options::Common;
 
-/// Values of a task's difficulties, by name: those of the file, unless the command line names a
-/// preset, then those of `--set`.
+/// Values of a task's difficulties, by name.
+///
+/// They are those of the file, unless the command line names a preset; `--set` overrides both.
 pub fn levels(task: &dyn Task, common: &Common) -> Result<BTreeMap<String, f64>> {
     let file = configured(common)?;
     let mut given = toml::Table::new();
@@ -31,7 +32,7 @@ pub fn levels(task: &dyn Task, common: &Common) -> Result<BTreeMap<String, f64>>
     Ok(start.with(&last)?.values())
 }
 
-/// The levels that a file asks for.
+/// The levels of a configuration file.
 fn of_file(task: &dyn Task, file: &toml::Table) -> Result<Levels> {
     let start = match text(file, "preset")? {
         Some(name) => Levels::preset(task.difficulty(), &name)?,
@@ -51,8 +52,10 @@ pub fn at(task: Box<dyn Task>, levels: &BTreeMap<String, f64>) -> Result<Box<dyn
     })
 }
 
-/// Takes the noise out of a file's settings that only repeats what followed from the file's own
-/// difficulty, so that another difficulty has its own.
+/// Removes the noise from a file's settings where it only repeats what follows from the file's own
+/// difficulty.
+///
+/// Another difficulty then gets its own noise.
 pub fn forget_noise(task: &dyn Task, file: &mut toml::Table) -> Result<()> {
     let levels = of_file(task, file)?.values();
     let Some(toml::Value::Table(noise)) = file.get_mut("noise") else {

@@ -1,4 +1,4 @@
-//! How much work goes into what an episode is expected to tell.
+//! Effort of predicting what an episode tells.
 
 use anyhow::Result;
 use asid_algorithms::fisher::expected::ExpectedSettings;
@@ -12,8 +12,8 @@ use super::table::{section, wrong};
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct ExpectedConfig {
     /// Fits, each some 70 simulated episodes over the region that the one before found. Fewer are
-    /// quicker, and expect too much where the simulator is rough: [`ExpectedSettings::rounds`]. With
-    /// none, deviations are those that explorers are paid for.
+    /// quicker, and expect too much where the simulator is rough: [`ExpectedSettings::rounds`].
+    /// With none, deviations are those that explorers are paid for.
     pub rounds: usize,
 }
 
@@ -33,7 +33,7 @@ impl ExpectedConfig {
         Ok(Self { rounds })
     }
 
-    /// For the pipeline, which asks the identifier for the rest.
+    /// The settings for the pipeline, which gets the rest from the identifier.
     pub fn settings(self) -> ExpectedSettings {
         ExpectedSettings {
             rounds: self.rounds,

@@ -1,4 +1,4 @@
-//! The simulated real world: of which kind, and what is said of it besides.
+//! The simulated real world: its kind and its settings.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -44,14 +44,15 @@ fn follows(kind: &WorldKind) -> bool {
 }
 
 impl RealConfig {
-    /// Whether nothing is said of a real world other than the simulator.
+    /// Whether the settings describe no real world other than the simulator.
     pub fn is_simulator(&self) -> bool {
         self.world == WorldKind::Matched && self.truth.is_empty()
     }
 }
 
-/// Resolves the section `real` of the settings, under the options; `simulator` is the simulator's engine, and whether it has a model other than
-/// the task's scene.
+/// Resolves the section `real` of the settings, overridden by the options.
+///
+/// `simulator` is the simulator's engine, and whether it has a model other than the task's scene.
 pub fn resolve(
     table: &toml::Table,
     options: &Real,
@@ -115,13 +116,13 @@ pub fn resolve(
         }
         None => simulator.to_owned(),
     };
-    // Checked also where it is for other runs that share the settings.
+    // Check the ranges even where only other runs with the same settings use them.
     let ranges = PerturbationRanges::read(&section(table, "perturbation")?)?;
     real.perturbation = (kind == WorldKind::Perturbed).then_some(ranges);
     Ok(real)
 }
 
-/// True values of the configuration and of the command line, which wins.
+/// True values of the configuration, overridden by the command line.
 fn truth(
     table: &toml::Table,
     options: &Real,
@@ -148,7 +149,7 @@ fn truth(
     Ok(truth)
 }
 
-/// Effects of the configuration, then those of the command line, each checked for its form.
+/// Effects of the configuration, then those of the command line; the form of each is checked.
 fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
     let listed = match table.get("effects") {
         None => Vec::new(),

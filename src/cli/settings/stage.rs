@@ -1,4 +1,4 @@
-//! What settings are resolved for, and the start pose that some stages are told.
+//! The stage that settings are resolved for, and the start pose of stages that take one.
 
 use std::collections::BTreeMap;
 
@@ -9,11 +9,11 @@ use serde::Serialize;
 
 use super::table::{numbers, wrong};
 
-/// What settings are resolved for.
+/// The stage that settings are resolved for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
-    /// The whole pipeline, or many of them.
+    /// The whole pipeline, or many runs of it.
     Run,
     /// Exploration alone.
     Explore,
@@ -34,7 +34,7 @@ impl Stage {
         }
     }
 
-    /// Coordinates of the start pose that the stage is told.
+    /// Coordinates of the start pose that the stage takes.
     pub fn start(self, task: &dyn Task) -> &[Coordinate] {
         match self {
             Self::Run | Self::Identify => &[],
@@ -48,8 +48,9 @@ impl Stage {
     }
 }
 
-/// The start pose of a stage that is told it, and the names of the coordinates that
-/// were not given and took the middle of their range.
+/// The start pose of a stage that takes one.
+///
+/// Coordinates that were not given get the middle of their range; their names are returned too.
 pub fn start(
     stage: Stage,
     task: &dyn Task,
@@ -71,7 +72,8 @@ pub fn start(
             let known = coordinates.iter().map(|c| &*c.name);
             return Err(Error::unknown("start coordinate", name, known).into());
         };
-        // A tracker may show an object a little outside; further off it is another unit or frame.
+        // A tracker may report an object slightly outside the range; a value further off has
+        // another unit or frame.
         let [low, high] = c.range;
         let slack = high - low;
         if !(low - slack..=high + slack).contains(&value) {

@@ -1,4 +1,4 @@
-//! Reading settings out of TOML, with errors that name the key.
+//! Reads settings from TOML, with errors that name the key.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -34,7 +34,7 @@ pub fn read_table(path: &Path) -> Result<toml::Table> {
     })?)
 }
 
-/// The configuration file of a command, or what stands for one.
+/// The configuration file of a command, or the table that replaces it.
 pub fn configured(common: &Common) -> Result<toml::Table> {
     match &common.config {
         Some(path) => read_table(path),
@@ -51,20 +51,20 @@ pub fn given(common: &Common) -> Result<toml::Table> {
     Ok(table)
 }
 
-/// Settings of a type that names the keys.
+/// Deserialises settings into a type that names the keys.
 pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
     let wrong = |e: toml::de::Error| wrong("--config, --set", e.message().replace('\n', " "));
     table.try_into().map_err(wrong)
 }
 
-/// The settings of a file that may have these keys and no others.
+/// The settings of a file that may hold these keys and no others.
 pub fn read(path: &Path, known: &[&'static str]) -> Result<toml::Table> {
     let table = read_table(path)?;
     check_keys(&path.display().to_string(), &table, known)?;
     Ok(table)
 }
 
-/// A list of texts; none where the key is not there.
+/// A list of texts; empty where the key is missing.
 pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
     match table.get(key) {
         None => Ok(Vec::new()),
@@ -75,7 +75,7 @@ pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Applies `key.key=value`; a value that is no TOML is taken as text.
+/// Applies `key.key=value`; a value that is not valid TOML is taken as text.
 pub fn set(table: &mut toml::Table, assignment: &str) -> Result<()> {
     let (key, value) = assignment
         .split_once('=')

@@ -1,4 +1,4 @@
-//! The unknowns and the trackers' noise: the task's own, with what the configuration says of them.
+//! The unknowns and the trackers' noise: the task's own, overridden by the configuration.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub struct ParameterConfig {
     pub enabled: Option<bool>,
 }
 
-/// The task's unknowns with what the configuration says of them.
+/// The task's unknowns, overridden by the configuration.
 pub fn unknowns(
     task: &dyn Task,
     table: &toml::Table,
@@ -138,7 +138,7 @@ pub fn unknowns(
     Ok((resolved, parameters))
 }
 
-/// The task's tracking noise with what the configuration says of it.
+/// The task's tracking noise, overridden by the configuration.
 pub fn noise(task: &dyn Task, table: &toml::Table) -> Result<BTreeMap<String, f64>> {
     let mut all: BTreeMap<String, f64> = task
         .exploration()

@@ -1,4 +1,4 @@
-//! The cases of a folder, and which of them an engine takes.
+//! The cases of a folder, and which of them an engine can simulate.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::cli::failure;
 /// A case: its name, and its study.
 pub type Case = (String, PathBuf);
 
-/// Folders with a study, sorted; `only` names those to take, where it names any.
+/// Folders with a study, sorted; a non-empty `only` selects among them.
 pub fn cases(folder: &Path, only: &[String]) -> Result<Vec<Case>> {
     let fail = |message: String| Error::File {
         path: folder.to_owned(),
@@ -44,8 +44,8 @@ pub fn cases(folder: &Path, only: &[String]) -> Result<Vec<Case>> {
     Ok(found)
 }
 
-/// Cases whose scene an engine says that it cannot simulate, with its reason. Other faults of a study are for the
-/// method to tell.
+/// Cases whose scene an engine cannot simulate, with its reason. The method reports other faults of
+/// a study.
 pub fn refused(cases: &[Case], backend: &dyn Backend) -> BTreeMap<String, String> {
     let refusal = |(name, study): &Case| {
         let model = Study::model_of(study).ok()?;

@@ -1,4 +1,5 @@
-//! One case in a process of its own: with a time limit, with its memory watched, and ended with this process.
+//! Runs one case in a process of its own, with a time limit and a watch on its memory. The process
+//! ends when this one ends.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -26,7 +27,7 @@ impl Stop {
         Ok(stop)
     }
 
-    /// An error where it was.
+    /// Returns an error if it was told to stop.
     pub fn check(&self) -> Result<()> {
         if self.0.load(Ordering::SeqCst) {
             let line =
@@ -42,18 +43,18 @@ impl Stop {
 pub struct Ended {
     /// Wall time, s.
     pub seconds: f64,
-    /// Largest resident memory, MiB, where the system tells it.
+    /// Largest resident memory, MiB, where the system reports it.
     pub memory_mib: Option<f64>,
-    /// Why it failed; `None` where it did not.
+    /// Why it failed; `None` on success.
     pub failure: Option<String>,
     /// Whether the time limit ended it.
     pub over_limit: bool,
 }
 
-/// Time between two looks at a process.
+/// Interval at which a process is polled.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Ends the process when it goes out of scope: nothing runs on after an error.
+/// Ends the process when it goes out of scope, so that nothing runs on after an error.
 struct Guard(Child);
 
 impl Drop for Guard {
@@ -63,7 +64,7 @@ impl Drop for Guard {
     }
 }
 
-/// Largest resident memory of a running process, MiB: the high-water mark that Linux keeps.
+/// Largest resident memory of a running process, MiB: Linux's high-water mark.
 fn memory(process: u32) -> Option<f64> {
     let text = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
@@ -71,12 +72,13 @@ fn memory(process: u32) -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-/// Runs a command in a working folder; `limit` is in seconds. What was told to stop says nothing of the case.
+/// Runs a command in a working folder; `limit` is in seconds. A process that was told to stop says
+/// nothing about the case.
 pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>, stop: &Stop) -> Result<Ended> {
     stop.check()?;
     command
         .current_dir(folder)
-        // They would name the folder that this call was made in.
+        // These variables would reveal the folder in which this call was made.
         .env_remove("PWD")
         .env_remove("OLDPWD")
         .stdin(Stdio::null())
@@ -99,7 +101,7 @@ pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>, stop: &Stop
     let (status, seconds) = loop {
         memory_mib = memory(guard.0.id()).or(memory_mib);
         let seconds = clock.elapsed().as_secs_f64();
-        // The signal may have reached the process first.
+        // The signal may have reached the child first.
         stop.check()?;
         let status = guard
             .0
@@ -177,7 +179,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn its_memory_is_seen() {
-        // A shell takes more than a tenth of a MiB and less than 100.
+        // A shell takes more than a tenth of a MiB and less than 100 MiB.
         let seen = shell("sleep 0.2", None).memory_mib.unwrap();
         assert!(seen > 0.1 && seen < 100.0, "{seen}");
     }

@@ -1,4 +1,4 @@
-//! Controls: a check that cannot fail says nothing, so it is spoilt on purpose and must fail; and one that must not.
+//! Controls of the check: runs that are spoilt on purpose and must fail, and one that must not.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +13,8 @@ pub enum Control {
     Scrambled,
     /// The readings of the logs are replaced by noise: no effect may be named
     Noise,
-    /// The true effects are not in the catalogue: `unknown` is right, or the same physics by another name
+    /// The true effects are not in the catalogue: `unknown` is right, or the same physics by
+    /// another name
     WithoutTruth,
     /// The labels themselves answer: all must be right, and the true effects close the gap
     Oracle,
@@ -30,7 +31,7 @@ impl Control {
         }
     }
 
-    /// What the result has to be, in a sentence.
+    /// The required result, as a sentence.
     pub fn expects(self) -> &'static str {
         match self {
             Self::Scrambled => {
@@ -48,7 +49,7 @@ impl Control {
         }
     }
 
-    /// The labels that answers are scored by.
+    /// The labels against which answers are scored.
     pub fn labels(self, labels: BTreeMap<String, Label>, seed: u64) -> BTreeMap<String, Label> {
         match self {
             Self::WithoutTruth | Self::Oracle => labels,
@@ -68,7 +69,8 @@ impl Control {
     }
 }
 
-/// Gives each case the label of another one: a cyclic permutation, drawn by Sattolo's algorithm (Sattolo 1986).
+/// Gives each case the label of another one: a cyclic permutation drawn by Sattolo's algorithm
+/// (Sattolo 1986).
 fn scrambled(labels: BTreeMap<String, Label>, seed: u64) -> BTreeMap<String, Label> {
     let (cases, mut drawn): (Vec<String>, Vec<Label>) = labels.into_iter().unzip();
     let mut random = Streams::new(seed).stream("scrambled labels");
@@ -78,7 +80,8 @@ fn scrambled(labels: BTreeMap<String, Label>, seed: u64) -> BTreeMap<String, Lab
     cases.into_iter().zip(drawn).collect()
 }
 
-/// Names of a case's causes that a catalogue may have; none where the true set is not one of effects.
+/// Names of a case's causes that a catalogue may have; empty where the true set does not consist of
+/// effects.
 pub fn true_effects(label: &Label) -> BTreeSet<String> {
     let effects = label.effects.iter().filter(|_| !label.is_unknown());
     effects.map(|e| name_of(e).to_owned()).collect()

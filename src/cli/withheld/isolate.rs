@@ -1,7 +1,7 @@
-//! A study alone: a copy in a folder of its own, from where nothing leads to its label.
+//! An isolated study: a copy in a folder of its own, from which nothing leads to its label.
 //!
-//! Whoever answers is given this copy and no other path. Labels may lie in the folder of the studies, as they do in
-//! older sets, so a study is copied file by file, and what may speak of its cause is left behind.
+//! A method gets this copy and no other path. Older sets keep labels in the folder of the studies.
+//! A study is therefore copied file by file, without files that may mention its cause.
 
 use std::path::{Path, PathBuf};
 
@@ -13,15 +13,15 @@ use asid_mjcf::Plant;
 use rand::Rng;
 use sha2::{Digest, Sha256};
 
-/// Endings of files that tell people of a study, and are no part of it.
+/// Extensions of files that describe a study to people and are no part of it.
 const PROSE: [&str; 4] = ["md", "txt", "json", "html"];
 
-/// What is done to a copy.
+/// Changes to a copy.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Treatment {
-    /// The time step of the model is divided by this.
+    /// Divisor of the model's time step.
     pub finer: u32,
-    /// Readings are replaced by noise, drawn from this seed.
+    /// Seed of the noise that replaces the readings.
     pub noise: Option<u64>,
 }
 
@@ -33,7 +33,7 @@ fn failed(path: &Path, error: &impl ToString) -> anyhow::Error {
     .into()
 }
 
-/// Files of a study, sorted: those of its folder and below, without prose.
+/// Files of a study, sorted: those in its folder and below, without prose.
 pub fn files(study: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let entries = std::fs::read_dir(study).map_err(|e| failed(study, &e))?;
@@ -123,7 +123,8 @@ fn treat(study: &Path, treatment: Treatment) -> Result<()> {
     Ok(())
 }
 
-/// Replaces each column of readings by white noise of the same mean and deviation; a start that the log gave goes.
+/// Replaces each column of readings by white noise of the same mean and deviation. A start given by
+/// the log is removed.
 fn turn_to_noise(episode: &mut Episode, random: &mut impl Rng) {
     let width = episode.width();
     for column in 0..width {
@@ -141,7 +142,7 @@ fn turn_to_noise(episode: &mut Episode, random: &mut impl Rng) {
         let deviation = (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
         let column = episode.readings.iter_mut().skip(column).step_by(width);
         for x in column.filter(|x| x.is_finite()) {
-            // Box and Muller's transform.
+            // Box-Muller transform.
             let (u, v): (f64, f64) = (1.0 - random.random::<f64>(), random.random());
             let normal = (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos();
             *x = mean + deviation * normal;

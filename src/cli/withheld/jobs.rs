@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Does something to each item, some at a time; what comes of it in the items' order.
+/// Applies `work` to each item, at most `jobs` at a time; the results are in the items' order.
 pub fn side_by_side<T: Sync, R: Send>(
     jobs: usize,
     items: &[T],

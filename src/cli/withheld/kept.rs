@@ -1,4 +1,4 @@
-//! Answers that are kept: each case has a folder that is there when the case is done, and says what it is bound to.
+//! Stored answers. Each finished case has a folder, which also states what the answer depends on.
 
 use std::path::{Path, PathBuf};
 
@@ -13,15 +13,15 @@ use super::method::{self, Asked};
 use crate::cli::output::staging::Staging;
 use crate::cli::output::write_json;
 
-/// The file that says that a case is done.
+/// The file that marks a case as done.
 const RUN: &str = "run.json";
-/// The files of an answer that are kept: the others repeat the logs.
+/// The files of an answer that are kept; the others repeat the logs.
 const KEPT: [&str; 3] = ["result.json", "refined.toml", "evidence.json"];
 
 /// How a case was answered; `run.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Kept {
-    /// 1.
+    /// Version of the layout: 1.
     schema: u32,
     /// SHA-256 of what the answer depends on: the program, the call, the study's files.
     key: String,
@@ -31,9 +31,9 @@ pub struct Kept {
     pub seconds: f64,
     /// Largest memory, MiB.
     pub memory_mib: Option<f64>,
-    /// Why there is no answer.
+    /// Why there is no answer; `None` if there is one.
     pub failure: Option<String>,
-    /// The limit that ended it, s.
+    /// The time limit that ended it, s.
     limit: Option<f64>,
 }
 
@@ -43,7 +43,7 @@ impl Kept {
         serde_json::from_str(&text).ok()
     }
 
-    /// What a folder holds, whatever made it, as it stands under a limit.
+    /// What a folder holds, whatever made it, judged under a time limit.
     pub fn at(folder: &Path, limit: Option<f64>) -> Option<Self> {
         let mut kept = Self::read(folder)?;
         if let Some(limit) = limit.filter(|limit| kept.seconds > *limit) {
@@ -52,7 +52,8 @@ impl Kept {
         Some(kept)
     }
 
-    /// Whether it is what would be found again: bound to `key`, and not ended by a smaller limit than the present one.
+    /// Whether a new run would give the same: it has the same `key`, and no smaller limit than the
+    /// present one ended it.
     fn stands(&self, key: &str, limit: Option<f64>) -> bool {
         let longer = |old: f64| limit.is_none_or(|new| new > old);
         self.key == key && !self.limit.is_some_and(longer)
@@ -84,7 +85,7 @@ impl Maker<'_> {
         self.into.join(case)
     }
 
-    /// Answers a case, unless that is done already; says whether it was.
+    /// Answers a case unless that is done already; returns whether it was.
     pub fn make(&self, case: &str, study: &Path) -> Result<bool> {
         let folder = self.folder(case);
         let key = self.key(study)?;
@@ -94,7 +95,7 @@ impl Maker<'_> {
         let failed = |path: &Path, e: &std::io::Error| {
             Error::Failed(format!("{}: cannot be written: {e}", path.display()))
         };
-        // What the process sees: the study, and room for its answer.
+        // The process sees the study and a place for its answer, nothing else.
         let place = tempfile::tempdir().map_err(|e| failed(Path::new("a temporary folder"), &e))?;
         isolate::copy(study, &place.path().join("study"), self.treatment)?;
         let mut command = self.asked.command("study", "answer")?;
@@ -152,9 +153,9 @@ mod tests {
             failure: None,
             limit,
         };
-        // Answered: it stands under any limit, and counts as too late under a shorter one.
+        // An answer is valid under any limit, and counts as too late under a shorter one.
         assert!(kept(3.0, None).stands("a", Some(1.0)) && !kept(3.0, None).stands("b", None));
-        // Ended at 10 s: nothing is known beyond.
+        // Ended at 10 s: nothing is known about longer limits.
         let ended = kept(10.0, Some(10.0));
         assert!(ended.stands("a", Some(5.0)) && ended.stands("a", Some(10.0)));
         assert!(!ended.stands("a", Some(20.0)) && !ended.stands("a", None));

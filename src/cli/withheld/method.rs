@@ -1,4 +1,4 @@
-//! What answers cases: the diagnosis, or a baseline that is asked the same.
+//! The methods that answer cases: the diagnosis, or a baseline on the same question.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -56,7 +56,7 @@ pub struct Asked {
     pub method: Method,
     pub backend: String,
     pub without: Vec<String>,
-    /// Effects left out of this case's catalogue besides those.
+    /// Effects left out of this case's catalogue, besides those of `without`.
     pub also_without: Vec<String>,
     seed: u64,
     threads: usize,
@@ -65,7 +65,7 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// What a method is asked with the arguments of this call.
+    /// The settings of a method under the arguments of this call.
     pub fn new(method: Method, arguments: &Arguments) -> Self {
         let common = &arguments.common;
         Self {
@@ -74,14 +74,14 @@ impl Asked {
             without: arguments.without.clone(),
             also_without: Vec::new(),
             seed: common.seed.unwrap_or(0),
-            // Cases run side by side, each on a core of its own, so that their times can be compared.
+            // Cases run side by side, each on one core, so that their times are comparable.
             threads: common.threads.unwrap_or(1),
             set: common.set.clone(),
             plugins: crate::cli::plugins::used(&[]),
         }
     }
 
-    /// The call, for a study and a folder for the answer, both named as the process sees them.
+    /// The arguments of the call, with the paths of study and answer as the process sees them.
     pub fn arguments(&self, study: &str, out: &str) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for plugin in &self.plugins {
@@ -113,7 +113,7 @@ impl Asked {
         all
     }
 
-    /// The process, to be run in the folder that holds `study`.
+    /// The command, to be run in the folder that holds `study`.
     pub fn command(&self, study: &str, out: &str) -> Result<Command> {
         let mut command = Command::new(program()?);
         command.args(self.arguments(study, out));
@@ -121,7 +121,8 @@ impl Asked {
     }
 }
 
-/// This program's file. Where the system has a name for what runs, that: the file may have been built anew by now.
+/// The file of this program. The system's name for the running file is preferred, because the
+/// original may have been rebuilt.
 pub fn program() -> Result<PathBuf> {
     let running = Path::new("/proc/self/exe");
     if running.exists() {
@@ -131,7 +132,7 @@ pub fn program() -> Result<PathBuf> {
         .map_err(|e| Error::Failed(format!("this program does not find itself: {e}")).into())
 }
 
-/// Answers one study by a baseline: what the process of a case does.
+/// Answers one study with a baseline, in the process of a case.
 pub fn answer(study: &Path, arguments: &Arguments) -> Result<()> {
     let method = arguments
         .method

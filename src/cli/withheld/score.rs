@@ -33,10 +33,10 @@ use crate::cli::output::{OutFolder, staging};
 use crate::cli::progress::Bars;
 use crate::cli::session::backend;
 
-/// Folder of the kept answers in the folder of the result.
+/// Folder of the stored answers within the folder of the result.
 const ANSWERS: &str = "answers";
 
-/// The call, with what it works on.
+/// The call and what it works on.
 pub struct Session<'a> {
     pub arguments: &'a Arguments,
     cases: Vec<Case>,
@@ -52,7 +52,8 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
     let session = Session::new(folder, arguments)?;
     let beside = folder.join("labels.json");
     let file = arguments.labels.as_deref().unwrap_or(&beside);
-    // This control alone needs the labels before the answers: what it leaves out of the catalogue they say.
+    // Only this control needs the labels before the answers: they say which effects to remove from
+    // the catalogue.
     let early = match arguments.control {
         Some(Control::WithoutTruth) => Some(read_labels(file)?),
         _ => None,
@@ -77,7 +78,7 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         ));
         return Ok(());
     }
-    // Everything is answered; now the labels.
+    // Everything is answered, so the labels may be read now.
     let labels = match early {
         Some(labels) => labels,
         None => read_labels(file)?,
@@ -120,7 +121,7 @@ impl<'a> Session<'a> {
 
     /// Folder of a method's answers.
     fn answers(&self, method: Method) -> PathBuf {
-        // Scrambled labels are put to the answers that there are.
+        // Scrambled labels are scored against the existing answers.
         let spoilt = self.arguments.control.filter(|c| *c != Control::Scrambled);
         let name = match spoilt {
             Some(control) => format!("{}-{}", method.name(), control.name()),
@@ -129,7 +130,7 @@ impl<'a> Session<'a> {
         self.out.join(ANSWERS).join(name)
     }
 
-    /// Answers what is not answered yet.
+    /// Answers the cases that have no answer yet.
     fn answer(&self, method: Method, early: Option<&BTreeMap<String, Label>>) -> Result<()> {
         let arguments = self.arguments;
         let (program, into) = (kept::program()?, self.answers(method));
@@ -197,7 +198,7 @@ impl<'a> Session<'a> {
                     let run = run_of(&folder.join(name), &kept);
                     Some(self.scored(name, study, label, &run))
                 }
-                // A folder without a label is passed over.
+                // A folder without a label is skipped.
                 (None, _) => None,
                 (Some(_), None) => {
                     unanswered.fetch_add(1, Ordering::Relaxed);
@@ -262,7 +263,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The folder of the result: new, empty, or one that holds answers already.
+/// The folder of the result: new, empty, or with existing answers.
 fn out_folder(out: Option<&Path>) -> Result<PathBuf> {
     let there = out.filter(|path| path.join(ANSWERS).is_dir());
     Ok(match there {
@@ -271,7 +272,7 @@ fn out_folder(out: Option<&Path>) -> Result<PathBuf> {
     })
 }
 
-/// What a kept answer is, for scoring.
+/// A stored answer in the form that is scored.
 fn run_of(folder: &Path, kept: &Kept) -> Run {
     Run {
         answer: match &kept.failure {
@@ -283,7 +284,7 @@ fn run_of(folder: &Path, kept: &Kept) -> Run {
     }
 }
 
-/// The answer of who knows the label.
+/// The answer of an oracle, which knows the label.
 fn of_oracle(label: &Label) -> Run {
     Run {
         answer: Ok(oracle(label)),
@@ -292,7 +293,7 @@ fn of_oracle(label: &Label) -> Run {
     }
 }
 
-/// What came of a case, in a line.
+/// A one-line summary of a case.
 fn told(name: &str, folder: &Path) -> String {
     let Some(kept) = Kept::at(folder, None) else {
         return format!("{name}: nothing came of it");

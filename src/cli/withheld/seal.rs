@@ -1,4 +1,5 @@
-//! The seal of a set of cases: nobody has changed a study or a label since they were made.
+//! The seal of a set of cases: it shows whether a study or a label was changed since they were
+//! made.
 
 use std::path::Path;
 
@@ -25,7 +26,7 @@ pub fn sealed(studies: &Path, labels: &Path) -> Result<()> {
     }
 }
 
-/// The generator, which knows how cases are sealed, is of builds with MuJoCo.
+/// Only builds with MuJoCo have the generator, which knows the seal.
 #[cfg(not(feature = "mujoco"))]
 pub fn sealed(studies: &Path, _labels: &Path) -> Result<()> {
     if studies.join("seal.json").is_file() {

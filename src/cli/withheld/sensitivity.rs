@@ -1,4 +1,5 @@
-//! What becomes of stored answers where a number that decides is halved or doubled: the decision is repeated, nothing is replayed.
+//! Sensitivity of stored answers to the numbers that decide. Each number is halved and doubled, and
+//! the decision is repeated without any replay.
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
@@ -27,18 +28,18 @@ pub struct Stored<'a> {
     evidence: Evidence,
 }
 
-/// What decisions by some rules come to.
+/// The result of deciding all cases by some rules.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 struct Tally {
-    /// Verdicts that are right by their names.
+    /// Verdicts whose names are right.
     right: usize,
-    /// Verdicts that are others than by the rules as they are.
+    /// Verdicts that differ from those of the unchanged rules.
     changed: usize,
-    /// Mean logarithm of the probability of the true set, which is at least 0.001.
+    /// Mean log-probability of the true set; the probability counts as at least 0.001.
     log_score: f64,
 }
 
-/// A rule, and what it comes to at other values.
+/// A rule, and the results at other values of it.
 #[derive(Debug, Serialize)]
 struct Row {
     rule: &'static str,
@@ -103,7 +104,7 @@ struct Output {
     cases: usize,
     as_is: Tally,
     rows: Vec<Row>,
-    /// The confidence that fits these answers, where something is named.
+    /// The confidence fitted to these answers, where any of them names something.
     refitted: Option<Fitted>,
 }
 
@@ -119,8 +120,10 @@ impl<'a> Stored<'a> {
         })
     }
 
-    /// What the verdict by some rules claims, and whether that, or what the logs do not tell from it, holds by the names; `None` where it names
-    /// nothing.
+    /// The claim of the verdict by some rules, and whether it is right by its names.
+    ///
+    /// A set that the logs cannot distinguish from the verdict counts as well. `None` where the
+    /// verdict names nothing.
     fn claimed(&self, rules: &Rules, catalogue: &BTreeSet<String>) -> Option<(Claim, bool)> {
         let judgement = decide(&self.evidence, rules);
         let claim = judgement.claim?;
@@ -141,7 +144,8 @@ impl<'a> Stored<'a> {
         Some((claim, verdict || { alike }.any(is_true)))
     }
 
-    /// The set of the verdict by some rules, whether it is right by its names, and the logarithm of the true set's probability.
+    /// The set of the verdict by some rules, whether its names are right, and the log-probability
+    /// of the true set.
     fn decided(&self, rules: &Rules, catalogue: &BTreeSet<String>) -> (Vec<String>, bool, f64) {
         let judgement = decide(&self.evidence, rules);
         let verdict = judgement.best_explanation();
@@ -173,7 +177,7 @@ impl<'a> Stored<'a> {
     }
 }
 
-/// Least probability that is scored, so that one miss does not weigh more than all else.
+/// Least probability that is scored, so that one miss does not outweigh all else.
 const LEAST: f64 = 1e-3;
 
 /// Repeats the decisions of stored answers with each number halved and doubled.

@@ -1,4 +1,4 @@
-//! What is written and told of scores.
+//! Writes and prints scores.
 
 use std::io::Write as _;
 
@@ -19,7 +19,7 @@ use crate::cli::result::Program;
 struct Output<'a> {
     #[serde(flatten)]
     score: &'a Score,
-    /// How the check was spoilt on purpose.
+    /// Name of the control by which the check was spoilt on purpose.
     control: Option<&'static str>,
     limit: Option<f64>,
     seed: u64,
@@ -31,7 +31,7 @@ struct Output<'a> {
 }
 
 impl Session<'_> {
-    /// Writes and tells the scores, the first method's first.
+    /// Writes and prints the scores; the first method's come first.
     pub fn write(&self, scores: &[Score]) -> Result<()> {
         let arguments = self.arguments;
         let Some((score, others)) = scores.split_first() else {
@@ -48,7 +48,7 @@ impl Session<'_> {
             others,
             versions: Program::THIS,
         };
-        // Cases and controls of one set stand side by side; a score is written anew as a whole.
+        // Files of cases and of controls lie side by side; a score is rewritten as a whole.
         let stem = arguments.control.map_or("", Control::name);
         let named = |name: &str| match stem {
             "" => self.out.join(name),

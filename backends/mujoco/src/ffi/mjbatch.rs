@@ -15,11 +15,11 @@ pub struct RawBatch {
 pub struct BatchConfig {
     /// Threads of the batch.
     pub nthread: c_int,
-    /// Whether they live on between calls.
+    /// Whether the threads persist between calls.
     pub persistent: bool,
 }
 
-/// `mjfBatch`: what runs on each simulation.
+/// `mjfBatch`: the function that runs on each simulation.
 pub type BatchFunction = unsafe extern "C" fn(*const mjModel, *mut mjData, c_int, *mut c_void);
 
 unsafe extern "C" {

@@ -1,4 +1,4 @@
-//! One simulation's model and data, seen from inside a batch call.
+//! One simulation's model and data, as seen inside a batch call.
 
 use std::marker::PhantomData;
 
@@ -8,15 +8,15 @@ use mujoco_rs::mujoco_c::{
     mjContact, mjData, mjModel,
 };
 
-/// First of the warnings about bad numbers: `qpos`, `qvel`, `qacc`, `ctrl`.
+/// Index of the first warning about bad numbers: `qpos`, `qvel`, `qacc`, `ctrl`.
 const WARN_BADQPOS: usize = 3;
 /// `mjMAXVAL`: a larger magnitude counts as bad.
 const MAX_VALUE: f64 = 1e10;
 
-/// Entries of the Jacobian of a contact, m/rad or 1, that are rounding.
+/// Largest entry of a contact's Jacobian that counts as rounding, m/rad or 1.
 const NO_LEVER: f64 = 1e-12;
 
-/// True where MuJoCo's own check calls a number bad: not finite, or above 1e10.
+/// Whether MuJoCo's own check calls a number bad: not finite, or above 1e10.
 #[must_use]
 pub fn is_bad(x: f64) -> bool {
     x.is_nan() || x.abs() > MAX_VALUE
@@ -24,8 +24,8 @@ pub fn is_bad(x: f64) -> bool {
 
 /// One simulation's model and data during [`Batch::apply`](super::Batch::apply).
 ///
-/// The pointers stay pointers, as MuJoCo writes through its own copies of them;
-/// slices are made for the length of a borrow.
+/// The pointers remain pointers, since MuJoCo writes through its own copies of them. Slices are
+/// made for the duration of a borrow.
 pub struct Sim<'a> {
     m: *const mjModel,
     d: *mut mjData,
@@ -38,8 +38,8 @@ macro_rules! arrays {
         #[doc = $doc]
         #[must_use]
         pub fn $name(&self) -> &[f64] {
-            // SAFETY: `m` and `d` are live and belong together; the array holds
-            // that many doubles, and `&self` keeps writers away.
+            // SAFETY: `m` and `d` are live and belong together; the array holds that many doubles,
+            // and `&self` excludes writers.
             unsafe { slice((*self.d).$name, (*self.m).$len as usize $(* $factor)?) }
         }
     )*};
@@ -98,8 +98,9 @@ impl Sim<'_> {
         unsafe { slice_mut((*self.d).xfrc_applied, (*self.m).nbody as usize * 6) }
     }
 
-    /// Sets an entry of a field that may change during a rollout; other fields are left alone.
-    /// The field has values of its own in this simulation ([`super::Batch::expand`]).
+    /// Sets an entry of a field that may change during a rollout; other fields are ignored.
+    ///
+    /// The field has separate values in this simulation ([`super::Batch::expand`]).
     pub fn write_live(&mut self, field: Field, entry: usize, value: f64) {
         // SAFETY: `m` is live; its arrays have the lengths compared with, and belong to this
         // simulation alone where they are expanded, as the caller promises.
@@ -137,13 +138,14 @@ impl Sim<'_> {
         unsafe { mj_step2(self.m, self.d) };
     }
 
-    /// Everything that follows from the present state and command.
+    /// Computes everything that follows from the current state and command.
     pub fn forward(&mut self) {
         // SAFETY: `m` and `d` are live and belong together.
         unsafe { mj_forward(self.m, self.d) };
     }
 
-    /// What MuJoCo warned about since the last reset that makes the state worthless.
+    /// The bad number that MuJoCo has warned about since the last reset; it makes the state
+    /// worthless.
     #[must_use]
     pub fn bad_number(&self) -> Option<BadNumber> {
         // SAFETY: `d` is live; an array of plain counters is read.
@@ -167,14 +169,16 @@ impl Sim<'_> {
             .then_some(BadNumber::Velocity)
     }
 
-    /// Sum of the normal forces between the geoms of two bodies, N, as of the
-    /// last [`Sim::forward`]. A contact that acts on no joint, as that of a thing without friction that slides along a table
-    /// and cannot leave it, counts as none: how large its force is nothing says.
+    /// Sum of the normal forces between the geoms of two bodies, N, as of the last
+    /// [`Sim::forward`].
+    ///
+    /// A contact that acts on no joint counts as none, since its force is undetermined. An example
+    /// is a frictionless object that slides along a table and cannot leave it.
     #[must_use]
     pub fn contact_force(&self, bodies: [usize; 2]) -> f64 {
         let mut sum = 0.0;
-        // SAFETY: `ncon` contacts in the array; geom indices are checked to be of
-        // geoms (a flex has -1) before they index `geom_bodyid`.
+        // SAFETY: `ncon` contacts in the array; geom indices are checked to be of geoms (a flex has
+        // -1) before they index `geom_bodyid`.
         unsafe {
             let (m, d) = (&*self.m, self.d);
             for i in 0..(*d).ncon {
@@ -200,7 +204,8 @@ impl Sim<'_> {
         let Ok(first) = usize::try_from(contact.efc_address) else {
             return false;
         };
-        // SAFETY: the rows of a contact that is in the problem lie within those of its Jacobian, dense (`nv` a row) or sparse.
+        // SAFETY: the rows of a contact that is in the problem lie within those of its Jacobian,
+        // dense (`nv` a row) or sparse.
         unsafe {
             let (d, nv) = (&*self.d, (*self.m).nv as usize);
             let dim = contact.dim as usize;
@@ -222,7 +227,7 @@ impl Sim<'_> {
     }
 }
 
-/// Which number of a state went bad.
+/// Which number of a state is bad.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BadNumber {
     /// A position.
@@ -231,11 +236,11 @@ pub enum BadNumber {
     Velocity,
     /// An acceleration.
     Acceleration,
-    /// A command or a force that was applied.
+    /// A command or an applied force.
     Command,
 }
 
-/// A slice of an array of MuJoCo, which is null where it is empty.
+/// A slice of an array of MuJoCo, which is null if empty.
 ///
 /// # Safety
 /// `ptr` holds `len` doubles that nobody writes for `'a`, or is null or `len` 0.
@@ -247,7 +252,7 @@ unsafe fn slice<'a>(ptr: *const f64, len: usize) -> &'a [f64] {
     unsafe { std::slice::from_raw_parts(ptr, len) }
 }
 
-/// As `slice` above, to write.
+/// As `slice` above, for writing.
 ///
 /// # Safety
 /// `ptr` holds `len` doubles that only the result touches for `'a`, or is null or `len` 0.

@@ -1,4 +1,5 @@
-//! A rollout of a batch: stretches of frames with the same parameters, each one call on the thread pool.
+//! A rollout of a batch, split into segments of frames with the same parameters. Each segment is
+//! one call on the thread pool.
 
 use std::ffi::c_int;
 use std::ops::Range;
@@ -10,7 +11,7 @@ use crate::ffi::BadNumber;
 use crate::rollout::{Frames, Job, Stage, run};
 
 impl MujocoSimulator {
-    /// [`asid_core::Simulator::rollout`].
+    /// Implements [`asid_core::Simulator::rollout`].
     pub(super) fn roll_out(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
         let layout = &self.compiled.layout;
         rollout.check(layout, self.batch_size(), self.plan.len(), out)?;
@@ -20,7 +21,7 @@ impl MujocoSimulator {
             ));
         }
         let segments = segments(rollout);
-        // All values are checked before the first step.
+        // Check all values before the first step.
         if !rollout.changes.is_empty() {
             let mut values = self.present(rollout.sims);
             for segment in &segments {
@@ -109,7 +110,7 @@ impl MujocoSimulator {
         Ok(())
     }
 
-    /// Writes parameters that are checked, and what follows from them.
+    /// Writes checked parameters and the constants that depend on them.
     pub(super) fn write_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
         let columns = self.plan.len();
         let mut derived: Vec<c_int> = Vec::new();
@@ -137,7 +138,7 @@ impl MujocoSimulator {
         }
     }
 
-    /// Present parameter values of some simulations.
+    /// Current parameter values of some simulations.
     fn present(&self, sims: &[usize]) -> Vec<f64> {
         let columns = self.plan.len();
         sims.iter()
@@ -153,7 +154,7 @@ impl MujocoSimulator {
             .try_for_each(|row| self.plan.check(row))
     }
 
-    /// Marks simulations that stopped, and those that MuJoCo raised an error in.
+    /// Marks simulations that stopped, and those in which MuJoCo raised an error.
     fn settle(&mut self, sims: &[usize], jobs: &[Job<'_>]) {
         for (&sim, job) in sims.iter().zip(jobs) {
             let stopped = match (self.batch.failure(sim), job.stopped) {
@@ -166,7 +167,7 @@ impl MujocoSimulator {
                 (None, None) => None,
             };
             if let Some((time, message)) = stopped {
-                // What a hook changed is still in the model.
+                // Changes by a hook are still in the model.
                 let columns = self.plan.len();
                 let set = &self.values[sim * columns..(sim + 1) * columns];
                 let unknown = vec![f64::NAN; columns];

@@ -1,4 +1,4 @@
-//! Scenes and short calls that the tests share.
+//! Scenes and helpers that the tests share.
 #![allow(dead_code, clippy::unwrap_used)]
 
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub const ARM: &str = r#"
   </keyframe>
 </mujoco>"#;
 
-/// A ball alone under gravity, with nothing to touch.
+/// A single ball under gravity that can touch nothing.
 pub const FALLING: &str = r#"
 <mujoco>
   <option timestep="0.01"/>

@@ -1,4 +1,4 @@
-//! What rapier's loader has built of a document, and where its parts are.
+//! What rapier's loader has built from a document, with the handles of its parts.
 
 use std::collections::HashMap;
 
@@ -13,14 +13,15 @@ use crate::document::Places;
 use crate::slot::JointSlot;
 use crate::state::State;
 
-/// A robot in rapier's collections, and where its parts are.
+/// A robot in rapier's collections, with the handles of its parts.
 pub(super) struct Built {
     handles: MjcfRobotHandles<Option<MultibodyJointHandle>>,
-    /// For each of the loader's bodies: the document's, and whether it only stands between two joints.
+    /// For each of the loader's bodies: the document's body, and whether it only connects two
+    /// joints.
     body_of_rapier: Vec<(usize, bool)>,
     geom_index: HashMap<String, (usize, usize)>,
     joint_index: HashMap<String, usize>,
-    /// Joints that are coupled, in pairs.
+    /// Pairs of coupled joints.
     couplings: Vec<(usize, usize)>,
 }
 
@@ -47,7 +48,7 @@ impl Built {
         }
     }
 
-    /// Refuses couplings of joints of two trees.
+    /// Refuses couplings between joints of two trees.
     pub(super) fn check_couplings(&self, state: &State) -> std::result::Result<(), String> {
         let tree = |joint: usize| {
             let child = self.handles.joints.get(joint).map(|j| j.link2)?;
@@ -81,7 +82,7 @@ impl Built {
         (0..n).map(of).collect()
     }
 
-    /// The document's joints as rapier has them.
+    /// The document's joints with their handles in rapier.
     pub(super) fn joints(
         &self,
         places: &Places,

@@ -1,7 +1,7 @@
-//! From a target's name to a slot, one function for each kind of element.
+//! Resolves a target's name into a slot, with one function for each kind of element.
 //!
-//! A target that would change nothing is refused: an identification of it would return its prior and look like a
-//! measurement.
+//! A target that would change nothing is refused: its identification would return the prior and
+//! look like a measurement.
 
 use asid_core::layout::{JointKind, Layout};
 use asid_core::{Error, Result, Target};
@@ -15,8 +15,8 @@ impl ParameterSlot {
     /// Resolves a target.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where the scene has no such thing or setting it
-    /// changes nothing, [`Error::Incapable`] where this engine cannot.
+    /// [`Error::Parameter`] when the scene has no such element or setting it changes nothing,
+    /// [`Error::Incapable`] when this engine cannot set it.
     pub fn resolve(target: &Target, compiled: &Compiled) -> Result<Self> {
         let slot = match target.element.as_str() {
             "option" if target.attribute == "gravity" => Self::Gravity(target.index),
@@ -33,7 +33,7 @@ impl ParameterSlot {
         Ok(slot)
     }
 
-    /// Entries of the attribute that it is one of.
+    /// Number of entries of the attribute.
     fn entries(self) -> usize {
         match self {
             Self::GeomFriction(..)
@@ -179,7 +179,7 @@ fn find<'a>(
     })
 }
 
-/// A friction that another one overrules in all contacts of its geom.
+/// Error for a friction that is overruled in all contacts of its geom.
 fn without_effect(target: &Target, by: Overruled, layout: &Layout) -> Error {
     let why = match by {
         Overruled::ByPair(other) => format!(

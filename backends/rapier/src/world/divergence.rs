@@ -11,7 +11,7 @@ const MAX_POSITION: f32 = 1e4;
 const MAX_RATE: f32 = 1e4;
 
 impl World {
-    /// Why the state is out of the plausible range, if it is.
+    /// Why the state is outside the plausible range; `None` if it is inside.
     pub(super) fn complaint(&self, compiled: &Compiled) -> Option<String> {
         let quarantine = self.pipeline.quarantine();
         if !quarantine.is_empty() {

@@ -1,4 +1,5 @@
-//! Forces on bodies in one physics step: what a rollout and a hook push with, and what contacts resist with.
+//! Forces on bodies in one physics step: those of a rollout and a hook, and the resistance of
+//! contacts.
 
 use asid_core::layout::JointKind;
 use nalgebra::Vector3;
@@ -8,8 +9,8 @@ use crate::compiled::Compiled;
 use crate::contact::Touching;
 use crate::convert;
 
-/// Largest force (N) or torque (N m) on a body. What it does to a velocity can
-/// still be squared in single precision; beyond that rapier takes it for nothing.
+/// Largest force (N) or torque (N m) on a body. Up to it, the resulting velocity can be squared in
+/// single precision; above it rapier ignores the force.
 pub(super) const MAX_FORCE: f64 = 1e15;
 
 impl World {

@@ -1,4 +1,4 @@
-//! A scene, a batch and named readings in few words.
+//! Helpers: a scene, a batch and named readings.
 
 #![allow(dead_code, clippy::unwrap_used)]
 
@@ -11,7 +11,7 @@ pub struct Bench {
     pub channels: Vec<String>,
 }
 
-/// Wraps the inside of a document.
+/// Wraps the content of a document.
 pub fn scene(inside: &str) -> Scene {
     let xml = format!("<mujoco><compiler angle=\"radian\"/>{inside}</mujoco>");
     Scene::from_xml("test", &xml, &[]).unwrap()
@@ -46,8 +46,8 @@ impl Bench {
         (0..self.simulator.batch_size()).collect()
     }
 
-    /// Runs all simulations under one constant command and gives every frame's
-    /// row, simulation after simulation.
+    /// Runs all simulations with one constant command, and returns every frame's row, simulation by
+    /// simulation.
     pub fn run(&mut self, frames: usize, ctrl: &[f64]) -> Vec<Vec<f64>> {
         let controls: Vec<f64> = ctrl
             .iter()

@@ -1,4 +1,4 @@
-//! How widely a diagnosis searches: the keys `search.KEY`.
+//! Breadth of a diagnosis' search: the keys `search.KEY`.
 
 use asid_diagnosis::settings::Breadth;
 use schemars::JsonSchema;

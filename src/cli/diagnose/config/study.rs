@@ -1,4 +1,4 @@
-//! The study that the settings lead to.
+//! The study that the settings describe.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use super::super::super::settings::{difficulty, wrong};
 use super::Config;
 
 impl Config {
-    /// The study: as written, or of a task with the logs that the settings name or `played`.
+    /// The study: as written, or of a task with the logs that the settings name or with `played`.
     pub fn study(&self, played: Option<Logs>) -> Result<Study> {
         match (&self.study, &self.task) {
             (Some(path), _) => Ok(Study::read_with(path, self.model.as_deref())?),
@@ -44,7 +44,7 @@ impl Config {
     }
 }
 
-/// Logs to fit to and logs held out, with their names.
+/// Logs to fit and logs held out, with their names.
 pub type Logs = (Vec<(String, Episode)>, Vec<(String, Episode)>);
 
 /// Reads logs of a machine, with their names.

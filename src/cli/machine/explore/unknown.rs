@@ -5,10 +5,11 @@ use asid_sysid::design::Designed;
 use asid_sysid::tells::Told;
 use serde::Serialize;
 
-/// Most repeats that are counted: who would play more looks for another motion.
+/// Largest number of repeats that is counted; above it another motion is the better choice.
 const MOST_REPEATS: usize = 1000;
 
-/// Ratio of the deviation that is expected to that by slopes alone from which on contact limits what a motion tells.
+/// Contact limits a motion when the expected deviation exceeds the one from slopes alone by this
+/// ratio.
 const LIMITED: f64 = 2.0;
 
 /// What is known of an unknown, in its unit.
@@ -31,12 +32,12 @@ pub struct UnknownResult {
     pub by_slopes: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub both: Option<f64>,
-    /// Plays of the motion until it is known to the precision asked for, with the logs; null where no number of them
-    /// suffices.
+    /// Plays of the motion until it is known to the precision asked for, with the logs; null where
+    /// no number of them suffices.
     pub repeats: Option<usize>,
 }
 
-/// What a deviation is measured by: the value, or the middle of the range where the value is zero.
+/// Reference of a deviation: the value, or the middle of the range where the value is zero.
 fn reference(parameter: &Parameter, value: f64) -> f64 {
     if value == 0.0 {
         parameter.center().abs()
@@ -45,7 +46,7 @@ fn reference(parameter: &Parameter, value: f64) -> f64 {
     }
 }
 
-/// What is known of the unknowns, before and after.
+/// What is known of the unknowns, before and after the motion.
 pub fn unknown_results(
     unknowns: &[Parameter],
     values: &[f64],
@@ -67,7 +68,7 @@ pub fn unknown_results(
             let unit = |scaled: f64| p.unscale_std(values[i], scaled);
             let wanted = precision * reference(p, values[i]);
             let enough = |n: usize| unit(motion.and(n as f64, known).deviations()[i]) <= wanted;
-            // Information only grows: halving finds the fewest.
+            // Information only grows with repeats, so bisection finds the fewest.
             let repeats = (wanted > 0.0 && enough(MOST_REPEATS)).then(|| {
                 let (mut low, mut high) = (0, MOST_REPEATS);
                 while low < high {

@@ -1,16 +1,18 @@
-//! Options of `explore` that go with any machine.
+//! Options of `explore` for any machine.
 
 /// Options of `explore` that go with any machine.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Options {
-    /// Seek this unknown of any machine, beside those of the study; a fourth part `log` has it on a logarithmic scale
-    /// (repeatable)
+    /// Seek this unknown of any machine, beside those of the study; a fourth part `log` has it on a
+    /// logarithmic scale (repeatable)
     #[arg(long, value_name = "TARGET:LOW:HIGH", help_heading = "Any machine")]
     pub unknown: Vec<String>,
-    /// Nuisance parameter: unknown within this range and estimated with the others, but the motion is not made for it (repeatable)
+    /// Nuisance parameter: unknown within this range and estimated with the others, but the motion
+    /// is not made for it (repeatable)
     #[arg(long, value_name = "TARGET:LOW:HIGH", help_heading = "Any machine")]
     pub nuisance: Vec<String>,
-    /// Make this small: a-optimal (sum of variances), d-optimal (their volume), trace (of the information, to be large)
+    /// Make this small: a-optimal (sum of variances), d-optimal (their volume), trace (of the
+    /// information, to be large)
     #[arg(long, value_name = "NAME", help_heading = "Any machine")]
     pub objective: Option<String>,
     /// Move for so long, s
@@ -19,7 +21,8 @@ pub struct Options {
     /// Command and read at this period, s
     #[arg(long, value_name = "S", help_heading = "Any machine")]
     pub period: Option<f64>,
-    /// Keep a joint here, rad or m [default: its range in the model, less 2 % at either end] (repeatable)
+    /// Keep a joint here, rad or m [default: its range in the model, less 2 % at either end]
+    /// (repeatable)
     #[arg(long, value_name = "JOINT:LOW:HIGH", help_heading = "Any machine")]
     pub limit_position: Vec<String>,
     /// Keep a joint below this speed, rad/s or m/s; without a joint all (repeatable)
@@ -28,7 +31,8 @@ pub struct Options {
     /// Keep a drive's force on its joint below this, N or N m; without an actuator all (repeatable)
     #[arg(long, value_name = "[ACTUATOR:]FORCE", help_heading = "Any machine")]
     pub limit_force: Vec<String>,
-    /// Keep the origin of a body's frame in this box of the world, m, along the whole motion (repeatable)
+    /// Keep the origin of a body's frame in this box of the world, m, along the whole motion
+    /// (repeatable)
     #[arg(
         long,
         value_name = "BODY:X0:X1:Y0:Y1:Z0:Z1",

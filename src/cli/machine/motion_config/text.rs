@@ -1,4 +1,4 @@
-//! Names and numbers with colons between, as options and settings have them.
+//! Names and numbers separated by colons, as in options and settings.
 
 use anyhow::Result;
 
@@ -9,7 +9,7 @@ fn number(key: &str, text: &str) -> Result<f64> {
     parsed.ok_or_else(|| wrong(key, format!("`{text}` is not a finite number")))
 }
 
-/// A name, which may hold colons, and `N` numbers behind it.
+/// Parses a name, which may hold colons, followed by `N` numbers.
 pub fn name_and<const N: usize>(key: &str, text: &str) -> Result<(String, [f64; N])> {
     let parts: Vec<&str> = text.rsplitn(N + 1, ':').collect();
     let form = || {
@@ -28,7 +28,7 @@ pub fn name_and<const N: usize>(key: &str, text: &str) -> Result<(String, [f64; 
     Ok(((*name).to_owned(), values))
 }
 
-/// A name, or none, and a number above zero.
+/// Parses an optional name and a number above zero.
 pub fn maybe_name(key: &str, text: &str) -> Result<(String, f64)> {
     let (name, value) = text.rsplit_once(':').unwrap_or(("", text));
     let value = number(key, value)?;
