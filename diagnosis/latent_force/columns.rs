@@ -1,9 +1,11 @@
-//! Effects as columns: what a unit of each adds to the model along the smoothed trajectory.
+//! Effects as columns: the change of the model per unit of each effect along the smoothed
+//! trajectory.
 //!
-//! A parameter that acts in proportion from its null on is a slope, taken over a part of the size that the
-//! missing force allows it; one that has no slope there (play, a dead band, a limit) is a secant at each of the values
-//! that the effect says a search begins with. Sizes come from the logs: an effect may make up for forces as large as
-//! those that are missing, and for readings that are off by a part of their spread.
+//! A parameter that acts in proportion from its null on is a derivative, taken over a part of the
+//! size that the missing force allows. A parameter without a derivative at its null (backlash, a
+//! dead band, a limit) is a secant at each start value that its effect declares. Sizes come from
+//! the logs: an effect may make up for forces as large as the missing ones, and for errors of
+//! readings up to a part of their spread.
 
 mod asked;
 mod force_response;
@@ -36,37 +38,41 @@ use sizes::{REPLAY_TRIAL, sizes, sizes_along};
 use small_steps::take_smaller_steps;
 use source::{Along, Source};
 
-/// Share of a deviation of the prior that slopes of the present model are taken over.
+/// Step of the present model's derivatives, relative to a prior's standard deviation.
 const BASE_SHARE: f64 = 0.01;
-/// Share of a deviation of the prior that slopes are taken over: a plausible size, so that a law that saturates is seen
-/// as it acts.
+/// Step of the candidates' derivatives, relative to a prior's standard deviation: a plausible size,
+/// so that a law that saturates shows how it acts.
 const SHARE: f64 = 0.2;
-/// Most that a coefficient may be, in deviations of its prior.
+/// Largest coefficient, in standard deviations of its prior.
 const MOST: f64 = 3.0;
-/// Secants may be taken up to this multiple of their start value.
+/// Largest coefficient of a secant, as a multiple of its start value.
 pub const SECANT: f64 = 1.5;
 
-/// Says of each candidate whether it leads, by columns along a part of the segments.
+/// Decides for each candidate whether it leads, from columns along a part of the segments.
 pub type Leads<'l> = &'l dyn Fn(&Columns) -> Vec<bool>;
 
-/// All candidates as columns of one regression, those of the present model's own unknowns first.
+/// All candidates as columns of one regression, preceded by those of the present model's own
+/// unknowns.
 pub struct Columns {
-    /// The linearisation, with its columns in units of the priors' deviations.
+    /// The linearisation, with its columns in units of the priors' standard deviations.
     pub linear: Vec<LinearEpisode>,
-    /// Columns of the present model.
+    /// Number of columns of the present model.
     pub base: usize,
     /// The ways to take the candidates.
     pub forms: Vec<Form>,
-    /// Where the prior's center lies from the present point, in deviations; one a column.
+    /// Prior's center relative to the present point, in standard deviations; one per column.
     pub center: Vec<f64>,
-    /// Bounds about the present point, in deviations.
+    /// Bounds about the present point, in standard deviations.
     pub bounds: Vec<[f64; 2]>,
-    /// Whether all candidates are there: those that work was stopped before add nothing.
+    /// Whether all candidates are included: those not reached when work was stopped contribute
+    /// nothing.
     pub complete: bool,
 }
 
-/// Gives the slopes of a form other deviations of their priors, by factors of those that they have, which become those that were taken: a
-/// deviation is at most half of its range, and a secant has none.
+/// Multiplies the priors' standard deviations of a form's derivatives by `factors`, and updates the
+/// factors to those applied.
+///
+/// A standard deviation is at most half of its range. A secant has none.
 fn resize(
     form: &mut Form,
     candidates: &[Candidate],
@@ -88,7 +94,7 @@ fn resize(
     }
 }
 
-/// Multiplies each of `m` columns.
+/// Multiplies each of the columns by its factor.
 fn multiply((states, readings): &mut Along, factors: &[f64]) {
     for rows in [states, readings] {
         for row in rows.chunks_exact_mut(factors.len().max(1)) {
@@ -97,8 +103,11 @@ fn multiply((states, readings): &mut Along, factors: &[f64]) {
     }
 }
 
-/// What the linearisation of the present model has to tell, and the steps of the states that it is taken with. Columns are told
-/// apart by slopes in forces at the very point that they are taken at; replays of segments have none.
+/// Returns the derivatives of the present model that are wanted, and the steps of their finite
+/// differences.
+///
+/// Derivatives with respect to forces, at the same point, separate the columns of a group. Replays
+/// of segments have none.
 fn slopes_wanted(context: &Context<'_>) -> (Derivatives, Vec<f64>) {
     let replayed = context.has_segments();
     let want = Derivatives {
@@ -114,7 +123,8 @@ fn slopes_wanted(context: &Context<'_>) -> (Derivatives, Vec<f64>) {
     (want, steps)
 }
 
-/// Deviations of the priors of some trials where segments are replayed, before their columns are known: shares of the ranges.
+/// Returns the priors' standard deviations of some trials before their columns along replays are
+/// known: fractions of the ranges.
 fn sizes_by_range(candidates: &[Candidate], trials: &[Trial]) -> Vec<f64> {
     let size = |&(c, _, p): &Trial| {
         let [low, high] = candidates[c].ranges[p];
@@ -124,9 +134,13 @@ fn sizes_by_range(candidates: &[Candidate], trials: &[Trial]) -> Vec<f64> {
 }
 
 impl Columns {
-    /// Columns of a fitted model's unknowns and of all candidates, along its trajectory; of those that there is time for where
-    /// the work is stopped. Where there are many segments, the columns of those that `leads` says lead on a part of them
-    /// (one flag a candidate), and the others' are zero elsewhere.
+    /// Computes the columns of a fitted model's unknowns and of all candidates along its
+    /// trajectory.
+    ///
+    /// If the work is stopped, it includes only the candidates that there was time for. With many
+    /// segments, all candidates are computed along a part of them. Those that lead there according
+    /// to `leads` (one flag per candidate) are computed along the rest too; the others' columns are
+    /// zero there.
     ///
     /// # Errors
     /// When the engine fails.

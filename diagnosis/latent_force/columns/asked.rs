@@ -1,4 +1,5 @@
-//! Which columns are asked for: one a parameter of the present model, and those of each way to take a candidate.
+//! Which columns are requested: one per parameter of the present model, and those of each way to
+//! take a candidate.
 
 use crate::candidate::Candidate;
 use crate::latent_force::fit::Hypothesis;
@@ -9,25 +10,27 @@ use super::form::Form;
 use super::source::Wanted;
 use super::{BASE_SHARE, MOST, SECANT, SHARE};
 
-/// A parameter that acts in proportion, at one of the starts of its candidate: candidate, values to begin with, parameter.
+/// A parameter that acts in proportion, at one start of its candidate: candidate, start values,
+/// parameter.
 pub(super) type Trial = (usize, Vec<f64>, usize);
 
-/// Columns that are asked for.
+/// The requested columns.
 #[derive(Default)]
 pub(super) struct Asked {
-    /// Where the prior's center lies from the present point, in deviations; one a column.
+    /// Prior's center relative to the present point, in standard deviations; one per column.
     pub(super) center: Vec<f64>,
-    /// Bounds about the present point, in deviations.
+    /// Bounds about the present point, in standard deviations.
     pub(super) bounds: Vec<[f64; 2]>,
-    /// Columns of the present model's own unknowns, which come first.
+    /// Number of columns of the present model's own unknowns, which come first.
     pub(super) base: usize,
-    /// What stands behind the others.
+    /// The candidates' values behind the other columns.
     pub(super) wanted: Vec<Wanted>,
     /// The ways to take the candidates.
     pub(super) forms: Vec<Form>,
 }
 
-/// Bounds of a slope with a prior of deviation `size`, in deviations about its null.
+/// Bounds of a derivative's coefficient with a prior standard deviation `size`, in those units
+/// about its null.
 pub(super) fn bounds(candidate: &Candidate, parameter: usize, size: f64) -> [f64; 2] {
     let [low, high] = candidate.limits(parameter);
     let null = candidate.parameters()[parameter].null;
@@ -37,7 +40,7 @@ pub(super) fn bounds(candidate: &Candidate, parameter: usize, size: f64) -> [f64
     ]
 }
 
-/// Every start of every candidate, with the slopes at it.
+/// Returns every start of every candidate, with the parameters that act in proportion there.
 pub(super) fn trials(candidates: &[Candidate]) -> Vec<Trial> {
     let mut trials = Vec::new();
     for (c, candidate) in candidates.iter().enumerate() {
@@ -50,7 +53,8 @@ pub(super) fn trials(candidates: &[Candidate]) -> Vec<Trial> {
 }
 
 impl Asked {
-    /// Columns of a model's own unknowns at `theta`, and the points that they are taken at.
+    /// Returns the columns of a model's own unknowns at `theta`, and the points of their finite
+    /// differences.
     pub(super) fn of_model(model: &Hypothesis, theta: &[f64]) -> (Self, Vec<Variation>) {
         let mut asked = Self::default();
         let free = model.free();
@@ -73,7 +77,7 @@ impl Asked {
         (asked, variations)
     }
 
-    /// Adds the engine's own error to those of the present model.
+    /// Adds the engine's own error to the columns of the present model.
     pub(super) fn add_step_error(&mut self, error: &StepError) {
         self.base += error.columns();
         self.center.extend(error.center());
@@ -81,8 +85,12 @@ impl Asked {
             .resize(self.base, [f64::NEG_INFINITY, f64::INFINITY]);
     }
 
-    /// Adds those of all candidates; `sizes` are the deviations of the priors of their [`trials`], 0 for what does nothing. Where segments are
-    /// `replayed`, what is large is a secant beside its slopes: a replay in which a joint moves has no slope that tells of one that stands.
+    /// Adds the columns of all candidates.
+    ///
+    /// `sizes` are the priors' standard deviations of their [`trials`], 0 for a parameter without
+    /// effect. Where segments are `replayed`, large values are secants in addition to the
+    /// derivatives: a replay in which a joint moves has no derivative that shows one held by
+    /// friction.
     pub(super) fn add(&mut self, candidates: &[Candidate], sizes: &[f64], replayed: bool) {
         let mut sizes = sizes.iter();
         for (c, candidate) in candidates.iter().enumerate() {
@@ -124,7 +132,8 @@ impl Asked {
         }
     }
 
-    /// Values that each slope begins at, none of a secant; one a column beyond the present model's.
+    /// Returns the values at which each derivative begins, `None` for a secant; one per column
+    /// beyond the present model's.
     pub(super) fn begins(&self) -> Vec<Option<&[f64]>> {
         let mut begins = Vec::new();
         for form in &self.forms {
@@ -135,7 +144,7 @@ impl Asked {
         begins
     }
 
-    /// Adds what a candidate does at some values.
+    /// Adds the effect of a candidate at given values.
     fn push_secant(&mut self, candidate: usize, values: &[f64]) {
         let secant = Wanted {
             candidate,

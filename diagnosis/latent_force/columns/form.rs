@@ -1,31 +1,32 @@
-//! One way to take a candidate, and what it is as unknowns of a fit.
+//! One way to take a candidate, and its parameters as unknowns of a fit.
 
 use asid_effects::Start;
 
 use crate::candidate::Candidate;
 use crate::latent_force::fitted_value::Unknown;
 
-/// One way to take a candidate: some values to begin with, and the columns that stand for it.
+/// One way to take a candidate: start values, and the columns that represent it.
 #[derive(Clone, Debug)]
 pub struct Form {
     /// The candidate.
     pub candidate: usize,
-    /// Values of its parameters to begin with.
+    /// Start values of its parameters.
     pub begin: Vec<f64>,
-    /// For each column: the parameter that it is a slope in, with the deviation of its prior; `None` for a secant.
+    /// For each column: the parameter of the derivative, with its prior's standard deviation;
+    /// `None` for a secant.
     pub slopes: Vec<Option<(usize, f64)>>,
-    /// The first of its columns.
+    /// Index of the first of its columns.
     pub first: usize,
 }
 
 impl Form {
-    /// Places of its columns.
+    /// Returns the indices of its columns.
     #[must_use]
     pub fn columns(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.slopes.len()
     }
 
-    /// Values of the candidate's parameters at some coefficients of the columns.
+    /// Returns the values of the candidate's parameters at given coefficients of the columns.
     #[must_use]
     pub fn values(&self, candidate: &Candidate, coefficients: &[f64]) -> Vec<f64> {
         let mut values = self.begin.clone();
@@ -50,7 +51,7 @@ impl Form {
         values
     }
 
-    /// What its parameters are as unknowns of a fit.
+    /// Returns its parameters as unknowns of a fit.
     #[must_use]
     pub fn unknowns(&self, candidate: &Candidate) -> Vec<Unknown> {
         candidate
@@ -61,7 +62,7 @@ impl Form {
                 let p = &candidate.parameters()[i];
                 let slope = self.slopes.iter().flatten().find(|(k, _)| *k == i);
                 let [low, high] = candidate.ranges[i];
-                // A parameter that is no slope is as uncertain as it is large.
+                // A parameter without a derivative is as uncertain as it is large.
                 let width = (high - low) / 12.0_f64.sqrt();
                 let size = if p.is_limit() {
                     self.begin[i].abs()

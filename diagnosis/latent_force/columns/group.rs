@@ -1,10 +1,11 @@
-//! Groups of columns that reach different joints, or different sensors: one walk serves a group.
+//! Groups of columns that reach different joints or different sensors: each group shares one
+//! simulation.
 
 use asid_effects::Reach;
 
 use crate::latent_force::islands::Islands;
 
-/// Columns that are walked together, by their places in a list, with what each reaches.
+/// Columns that share a simulation, by their places in a list, with what each reaches.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
     /// Places of the columns.
@@ -14,7 +15,7 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// A column by itself.
+    /// A group of a single column.
     pub(super) fn single(member: usize, reach: Reach) -> Self {
         Self {
             members: vec![member],
@@ -22,7 +23,8 @@ impl Group {
         }
     }
 
-    /// The columns in groups of which each reaches another island; each by itself where all of them do so already.
+    /// Splits the group by islands; into single columns if each column already reaches a different
+    /// island.
     pub(super) fn apart(self, islands: &Islands) -> Vec<Self> {
         let by_islands = self.islands(islands).is_some();
         let each = self.members.into_iter().zip(self.reaches);
@@ -32,7 +34,7 @@ impl Group {
         by_island(each, islands)
     }
 
-    /// The island that each column reaches, where that is another for each.
+    /// Returns the island that each column reaches, if these all differ.
     pub(super) fn islands(&self, islands: &Islands) -> Option<Vec<usize>> {
         let own = self.reaches.iter().map(|r| islands.reached(r));
         let own: Vec<usize> = own.collect::<Option<_>>()?;
@@ -40,18 +42,19 @@ impl Group {
         own.iter().enumerate().all(is_first).then_some(own)
     }
 
-    /// Whether its columns are of readings alone.
+    /// Whether its columns are of effects on readings alone.
     pub(super) fn is_of_sensors(&self) -> bool {
         matches!(self.reaches[0], Reach::Sensor(_))
     }
 
-    /// Whether a column that reaches this can be walked with its own.
+    /// Whether a column with this reach can join the group.
     fn takes(&self, reach: &Reach) -> bool {
         self.reaches.iter().all(|own| own.is_apart_from(reach))
     }
 }
 
-/// Groups of columns, given with what they reach; each comes into the first that takes it.
+/// Forms groups of columns, given with what they reach; each column joins the first group that
+/// admits it.
 pub(super) fn grouped(columns: impl Iterator<Item = (usize, Reach)>) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for (member, reach) in columns {
@@ -66,7 +69,7 @@ pub(super) fn grouped(columns: impl Iterator<Item = (usize, Reach)>) -> Vec<Grou
     groups
 }
 
-/// Groups of columns each of which reaches another island, whatever it reaches there.
+/// Forms groups in which each column reaches a different island, whatever it reaches there.
 pub(super) fn by_island(
     columns: impl Iterator<Item = (usize, Reach)>,
     islands: &Islands,
@@ -96,7 +99,7 @@ pub(super) fn by_island(
 pub(super) mod tests {
     use super::*;
 
-    /// Of some degrees of freedom.
+    /// Returns the reach of an effect on some degrees of freedom.
     pub(in crate::latent_force::columns) fn dofs(own: &[usize]) -> Reach {
         Reach::Dofs(own.iter().copied().collect())
     }
@@ -119,7 +122,8 @@ pub(super) mod tests {
         let members: Vec<_> = groups.iter().map(|g| &g.members[..]).collect();
         assert_eq!(members, [&[0, 2][..], &[1], &[3]]);
         assert_eq!(groups[0].islands(&islands), Some(vec![0, 1]));
-        // What does not balance by islands is walked for alone; what did not by forces, by islands first.
+        // A group that does not separate by islands is split into single columns; one that did not
+        // by forces is first split by islands.
         assert_eq!(groups[0].clone().apart(&islands).len(), 2);
         let of_all = grouped([(0, dofs(&[0])), (1, dofs(&[1])), (2, dofs(&[2]))].into_iter());
         let apart = of_all[0].clone().apart(&islands);

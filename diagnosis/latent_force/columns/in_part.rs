@@ -1,8 +1,10 @@
-//! Columns along segments: of all candidates along a part of the segments, and of those that lead there along the others.
+//! Columns along segments: of all candidates along a part of them, and of the leading ones along
+//! the others.
 //!
-//! Of a segment a column is a replay of its own, which no other column shares, and a machine with contacts has hundreds of
-//! candidates. What leads on all segments leads on a third of them too, where they are spread over the logs and something moves along them: a log in
-//! which a puck is never reached tells nothing of what it slides on.
+//! Along a segment a column is a replay of its own, which it shares with no other column. A machine
+//! with contacts has hundreds of candidates. A candidate that leads on all segments also leads on a
+//! third of them, if these are spread over the logs and contain motion. A log in which a puck is
+//! never reached carries no information about the floor under it.
 
 use asid_core::Result;
 
@@ -12,12 +14,12 @@ use crate::latent_force::walk::Walk;
 use super::Columns;
 use super::source::{Along, Source, Wanted};
 
-/// Of so many segments one is replayed for all candidates.
+/// One segment of each group of this many is replayed for all candidates.
 const EVERY: usize = 3;
-/// Fewest segments of that part: one does not stand for the others.
+/// Fewest segments of that part: a single one does not represent the others.
 const FEWEST: usize = 2;
 
-/// The walks along which all candidates are taken, and the others.
+/// Returns the walks along which all candidates are computed, and the others.
 pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {
     let n = context.walks.len();
     if !context.has_segments() || n < EVERY * FEWEST {
@@ -29,8 +31,10 @@ pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {
     [first.clone(), others.collect()]
 }
 
-/// How much moves along a walk: of all entries of its readings, the logarithm of their variance in units of the noise, so that a thing that moves a little
-/// counts beside one that moves much.
+/// Returns a measure of the motion along a walk: the sum, over all entries of a reading, of the
+/// logarithm of their variance in units of the noise.
+///
+/// The logarithm lets an object that moves a little count beside one that moves much.
 fn motion(context: &Context<'_>, walk: &Walk) -> f64 {
     let logs = context.logs;
     let width = logs.width();
@@ -56,8 +60,10 @@ fn motion(context: &Context<'_>, walk: &Walk) -> f64 {
     sums.iter().zip(&noise).map(of_entry).sum()
 }
 
-/// Of each so many in a row the place of the largest, of the middle one where none is larger; of the last ones, if they are fewer, where they have a
-/// middle.
+/// Returns the index of the largest value of each group of [`EVERY`] consecutive ones; the middle
+/// one if none is larger.
+///
+/// A shorter last group counts only if it contains its middle index.
 fn most_of_each(values: &[f64]) -> Vec<usize> {
     let most = |first: usize| {
         let own = first..(first + EVERY).min(values.len());
@@ -69,12 +75,13 @@ fn most_of_each(values: &[f64]) -> Vec<usize> {
     firsts.filter_map(most).collect()
 }
 
-/// What some of the walks have, where any has it.
+/// Selects the items of some walks, where they have one.
 fn some<T: Clone>(all: &[T], which: &[usize]) -> Vec<T> {
     which.iter().filter_map(|&w| all.get(w).cloned()).collect()
 }
 
-/// Columns along some of the walks, zero along the others; and whether there was time for all of them.
+/// Returns columns along some of the walks, zero along the others, and whether there was time for
+/// all.
 pub(super) fn along(
     source: &Source<'_>,
     (context, states): (&Context<'_>, &[Vec<f64>]),
@@ -105,18 +112,18 @@ pub(super) fn along(
     Ok((out, complete))
 }
 
-/// What the columns of candidates along the other walks are taken with.
+/// What the columns along the other walks are computed with.
 pub(super) struct Rest<'r> {
     pub(super) source: &'r Source<'r>,
     pub(super) wanted: &'r [Wanted],
-    /// What each column is multiplied by: its prior's deviation is known by now.
+    /// Factor of each column, as its prior's standard deviation is now known.
     pub(super) factors: &'r [f64],
     /// The walks.
     pub(super) which: &'r [usize],
 }
 
 impl Columns {
-    /// Adds the columns of candidates that lead (one flag a candidate) along the rest of the walks.
+    /// Adds the columns of the leading candidates (one flag per candidate) along the other walks.
     pub(super) fn add_rest(
         &mut self,
         (context, states): (&Context<'_>, &[Vec<f64>]),

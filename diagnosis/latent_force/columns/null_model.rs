@@ -11,19 +11,20 @@ use crate::latent_force::trace::is_traceable;
 
 use super::source::Wanted;
 
-/// How the column of a candidate is found.
+/// How the column of a candidate is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
-    /// Without the engine: it acts through forces alone.
+    /// Without the engine: the candidate acts through forces alone.
     Traced,
-    /// By the engine, and one physics step of a row tells all of it: it acts by what the model is.
+    /// By the engine, from one physics step of a row: the candidate changes the model itself.
     OneStep,
-    /// By the engine's steps over whole rows.
+    /// By the engine, over whole rows.
     WholeRow,
 }
 
 impl Way {
-    /// The way for a candidate. Where some walks are `replayed`, all columns are those of whole replays.
+    /// Chooses the way for a candidate; where some walks are `replayed`, all columns are those of
+    /// whole replays.
     pub(super) fn of(replayed: bool, plant: &Plant, candidate: &Candidate) -> Self {
         if replayed {
             Self::WholeRow
@@ -43,12 +44,12 @@ pub(super) struct NullModel {
     pub(super) specs: Vec<EffectSpec>,
     pub(super) parameters: Vec<Parameter>,
     pub(super) theta: Vec<f64>,
-    /// First parameter of each candidate.
+    /// Index of each candidate's first parameter.
     first: Vec<usize>,
 }
 
 impl NullModel {
-    /// Of a model, its values, and candidates.
+    /// Builds it from a model, its values, and candidates.
     pub(super) fn new(
         context: &Context<'_>,
         (base, theta): (&Hypothesis, &[f64]),
@@ -74,7 +75,7 @@ impl NullModel {
         model
     }
 
-    /// All values with those of some candidates.
+    /// Returns all values, with those of some candidates set.
     pub(super) fn with_all<'w>(&self, wanted: impl Iterator<Item = &'w Wanted>) -> Vec<f64> {
         let mut theta = self.theta.clone();
         for w in wanted {

@@ -1,5 +1,5 @@
-//! Sizes of priors: an effect may make up for forces as large as those that are missing, and for readings that are off by a
-//! part of their spread.
+//! Widths of priors: an effect may make up for forces as large as the missing ones, and for errors
+//! of readings up to a part of their spread.
 
 use asid_core::Result;
 use nalgebra::DMatrix;
@@ -11,41 +11,45 @@ use crate::latent_force::estimate::Estimate;
 use crate::latent_force::step_error::StepError;
 use crate::latent_force::step_map::LinearEpisode;
 
-/// Share of a parameter's range over which its size is first felt for.
+/// Step that first measures what a parameter does, relative to its range.
 const TRIAL: f64 = 1e-5;
-/// Multiple of what segments leave of their readings that a deviation of a prior does to them, starts not moved: an
-/// acceleration moves them 5 times as much as it does once the start is fitted to it, and an effect may be seen in few of them.
+/// Multiple of the segments' residuals that one standard deviation of a prior causes at fixed
+/// initial states.
+///
+/// An acceleration changes the readings 5 times as much as it does once the initial state is fitted
+/// to it, and only a few segments may show an effect.
 const REPLAY_MULTIPLE: f64 = 10.0;
-/// Share of a parameter's range that slopes along replays are taken over: over less, what points of contact that come and go
-/// do hides it.
+/// Step of derivatives along replays, relative to a parameter's range: over a smaller step, contact
+/// points that appear and vanish hide the derivative.
 pub(super) const REPLAY_TRIAL: f64 = 0.03;
 /// Inertial force of a degree of freedom that does not move, N or N m.
 const SILENT: f64 = 1e-8;
-/// Share of the inertial forces that is missing at least, for the size of priors.
+/// Smallest missing force for the widths of priors, relative to the inertial forces.
 const LEAST_MISSING: f64 = 0.1;
 /// Quantile of the missing force that counts as its size.
 const QUANTILE: f64 = 0.99;
-/// That quantile of the size of a normal variable, in deviations.
+/// That quantile of a normal variable's magnitude, in standard deviations.
 const QUANTILE_OF_NORMAL: f64 = 2.6;
-/// Change of a speed from row to row, m/s or rad/s, that is none.
+/// Change of a speed from row to row that counts as none, m/s or rad/s.
 const STILL: f64 = 1e-9;
-/// Share of a reading's spread that an effect on it may make up for.
+/// Error of a reading that an effect may make up for, relative to the reading's spread.
 const READING_SHARE: f64 = 0.1;
-/// Rows of each part that sizes are felt for on.
+/// Rows of each short part along which the steps are measured.
 const PART: usize = 6;
-/// How many such parts there are, spread over all walks.
+/// Number of these parts, spread over all walks.
 const PARTS: usize = 24;
 
 /// Some short parts of the logs, evenly spread.
 struct Parts<'c> {
     context: Context<'c>,
-    /// The trajectory there, its slopes in forces and what is carried over rows, one a part.
+    /// The trajectory in each part, its derivatives with respect to forces, and
+    /// [`LinearEpisode::carried`].
     states: Vec<Vec<f64>>,
     slopes: Vec<ForceSlopes>,
     carried: Vec<Vec<f64>>,
 }
 
-/// Parts of the logs with the trajectory there.
+/// Returns short parts of the logs, with the trajectory there.
 fn parts<'c>(
     context: &'c Context<'_>,
     estimate: &Estimate,
@@ -96,8 +100,11 @@ fn parts<'c>(
     }
 }
 
-/// Deviations of priors from what a trial step of each parameter does, for `(candidate, start, parameter)`; 0 where it does
-/// nothing, and where work was stopped before it was felt for, which is said.
+/// Returns priors' standard deviations from the effect of a trial step of each parameter, one per
+/// `(candidate, start, parameter)`.
+///
+/// Zero where the step has no effect, and where work was stopped before it was measured. The flag
+/// says whether all were measured.
 pub(super) fn sizes(
     context: &Context<'_>,
     estimate: &Estimate,
@@ -128,12 +135,13 @@ pub(super) fn sizes(
         carried: &carried,
         slopes: &slopes,
         late: &[],
-        // What does nothing has no size: here nothing of another column may come into it.
+        // A parameter without effect has no size, so nothing of another column may leak into its
+        // column.
         together: false,
         progress: source.progress,
     };
     let (columns, complete) = source.columns(&short, &states, &wanted)?;
-    // A joint that neither moves nor lacks a force says nothing of sizes.
+    // A joint that neither moves nor lacks a force shows no size.
     let missing: Vec<f64> = estimate
         .force_quantile(context, QUANTILE)
         .iter()
@@ -196,7 +204,7 @@ pub(super) fn sizes(
     Ok((sizes, complete))
 }
 
-/// Spread of the readings of each entry.
+/// Returns the spread of the readings of each entry.
 pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
     let logs = context.logs;
     let mut out = Vec::with_capacity(logs.entries.len());
@@ -230,8 +238,8 @@ pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
     out
 }
 
-/// Deviations of priors where some walks are segments: the smaller of those that replays of segments say and of those that rows of the other
-/// walks do.
+/// Returns priors' standard deviations where some walks are segments: the smaller of those from
+/// replays and from rows of the other walks.
 pub(super) fn sizes_along(
     (context, estimate): (&Context<'_>, &Estimate),
     linear: &[LinearEpisode],
@@ -243,8 +251,11 @@ pub(super) fn sizes_along(
     by_replay.zip(by_rows).map(|(a, b)| a.min(b)).collect()
 }
 
-/// Deviations of priors where walks are segments, from what a unit of each parameter does to their readings along their
-/// replays, `rows x ns x m` for those walks that are said: a few times what is left of them, for the open starts take up most of it.
+/// Returns priors' standard deviations from the change of readings per unit of each parameter along
+/// replays of the walks `which`.
+///
+/// The columns are `rows x ns x m`. The result is a few times the residuals, because the free
+/// initial states take up most of a change.
 fn sizes_by_replay(
     context: &Context<'_>,
     estimate: &Estimate,
@@ -271,8 +282,10 @@ fn sizes_by_replay(
     squares.into_iter().map(size).collect()
 }
 
-/// Deviations of priors from what a unit of each parameter does to the speeds from row to row along those of some walks that are no segments,
-/// beside what is missing of these there; infinite where it does nothing.
+/// Returns priors' standard deviations from the change of speeds from row to row per unit of each
+/// parameter, along those of some walks that are not segments.
+///
+/// The reference is the missing change of speed there. Infinite where a parameter has no effect.
 fn sizes_along_rows(
     (context, estimate): (&Context<'_>, &Estimate),
     linear: &[LinearEpisode],

@@ -1,7 +1,9 @@
-//! Steps that slopes along whole replays are taken over, made smaller until what they change is small beside the motion.
+//! Steps of derivatives along whole replays, reduced until the changes that they cause are small
+//! beside the motion.
 //!
-//! A share of a catalogue's range fits no machine by itself: thirty N s/m stop a cart of one kilogram at once, and what that changes of its log is no
-//! slope. How much the readings change says so.
+//! A fixed fraction of a catalogue's range does not suit every machine. 30 N s/m stop a cart of 1
+//! kg at once, and the change of its log is then no derivative. The size of the change of the
+//! readings shows this.
 
 use asid_core::Result;
 
@@ -11,17 +13,22 @@ use super::in_part::along;
 use super::sizes::spreads;
 use super::source::{Along, Source, Wanted};
 
-/// Most that a step may change the readings of a sensor by, root mean square over the replays, as a share of their spread: a chord that long is right
-/// to about a tenth where the motion bends over its own size.
+/// Largest change of a sensor's readings by a step, relative to their spread (root mean square over
+/// the replays).
+///
+/// A secant of that length is right to about a tenth where the motion bends over its own size.
 const MOST: f64 = 0.1;
-/// The same in deviations of their noise, below which nothing is seen of it.
+/// The same in standard deviations of their noise, below which no change is visible.
 const LEAST: f64 = 3.0;
-/// Smallest factor of a step at a time: a change that saturates says nothing of how far it is too large.
+/// Smallest factor of a step per round: a saturated change does not show by how much the step is
+/// too large.
 const SMALLER: f64 = 0.1;
-/// Times that steps are made smaller, at most: a catalogue's range may be a thousand times too wide for a machine.
+/// Most rounds of reducing a step: a catalogue's range may be a thousand times too wide for a
+/// machine.
 const TIMES: usize = 3;
 
-/// What each of `m` steps changes of the readings of each entry, in units of the most that it may; of the entry that it changes most.
+/// Returns the change of readings by each of `m` steps, in units of the largest that is allowed,
+/// for the entry that changes most.
 fn changes(context: &Context<'_>, found: &[Along], wanted: &[Wanted], walks: &[usize]) -> Vec<f64> {
     let (m, entries) = (wanted.len(), &context.logs.entries);
     let noise = context.reading_variance.iter().map(|v| v.sqrt());
@@ -43,8 +50,11 @@ fn changes(context: &Context<'_>, found: &[Along], wanted: &[Wanted], walks: &[u
     (0..m).map(change).collect()
 }
 
-/// Takes the columns `found` along some walks anew over smaller steps, for those slopes whose steps change the motion; with the values that each
-/// slope begins at, none of a secant. Says whether there was time.
+/// Recomputes the columns `found` along some walks over smaller steps, for the derivatives whose
+/// steps change the motion.
+///
+/// `begins` holds the values at which each derivative begins, `None` for a secant. Returns whether
+/// there was time.
 pub(super) fn take_smaller_steps(
     source: &Source<'_>,
     (context, states): (&Context<'_>, &[Vec<f64>]),

@@ -1,4 +1,4 @@
-//! Where columns come from: the engine, or a trace of the forces.
+//! Where columns come from: the engine, or a trace of forces without it.
 
 use asid_core::{Progress, Result};
 use asid_effects::Reach;
@@ -13,11 +13,13 @@ use super::group::{Group, by_island, grouped};
 use super::null_model::{NullModel, Way};
 use super::together::{Account, Entries};
 
-/// Variations that one walk of the engine takes, at most: between two of them work can be stopped, and of all at once the memory
-/// would grow with the candidates.
+/// Most variations in one run of the engine.
+///
+/// Work can be stopped between two runs. With all variations at once, the memory would grow with
+/// the number of candidates.
 const SLICE: usize = 64;
 
-/// A column that is wanted: a candidate with some values, and what its change is divided by.
+/// A wanted column: a candidate with given values, and the divisor of its change.
 #[derive(Clone)]
 pub(super) struct Wanted {
     pub(super) candidate: usize,
@@ -26,7 +28,8 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// The slope of a candidate in a parameter about some values, over a step towards the inside of its range.
+    /// Returns the derivative of a candidate with respect to a parameter at given values, over a
+    /// step into its range.
     pub(super) fn slope(
         candidates: &[Candidate],
         c: usize,
@@ -50,33 +53,40 @@ impl Wanted {
     }
 }
 
-/// Columns along a walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns x m`.
+/// Columns along a walk: of the next states, `(rows - 1) x nx x m`, and of the readings,
+/// `rows x ns x m`.
 pub(super) type Along = (Vec<f64>, Vec<f64>);
 
-/// Columns of the present model with some candidates: those that need the engine from it, the others traced.
+/// Columns of the present model with some candidates: by the engine where it is needed, traced
+/// otherwise.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'s> {
     pub(super) candidates: &'s [Candidate],
-    /// Whether some of all walks are segments, if not of those that columns are wanted along.
+    /// Whether any walk of all is a segment, even if none of those at hand is.
     pub(super) replayed: bool,
-    /// The present model with those that one step tells of, and with those that take whole rows.
+    /// The present model with the candidates for which one physics step is enough, and with those
+    /// that need whole rows.
     pub(super) models: &'s [(Way, NullModel)],
-    /// What a change in each physics step of a row comes to, one a walk; empty where one step does not tell.
+    /// [`LinearEpisode::carried`](crate::latent_force::step_map::LinearEpisode::carried) of each
+    /// walk; empty where one physics step is not enough.
     pub(super) carried: &'s [Vec<f64>],
-    /// Slopes in forces, one a walk.
+    /// Derivatives with respect to forces, one per walk.
     pub(super) slopes: &'s [ForceSlopes],
-    /// How late readings are in the present model.
+    /// Delay of the readings in the present model.
     pub(super) late: &'s [Vec<f64>],
-    /// Whether the engine walks once for what acts on the motion and can be told apart, to a few percent of the largest column of a walk. What acts on
-    /// readings alone is told apart exactly, and is walked for together in any case.
+    /// Whether effects on the motion share runs of the engine, separated to a few percent of the
+    /// largest column of a run.
+    ///
+    /// Effects on readings alone separate exactly, and always share runs.
     pub(super) together: bool,
-    /// Who says when to stop.
+    /// Says when work has to stop.
     pub(super) progress: &'s dyn Progress,
 }
 
 impl Source<'_> {
-    /// The columns wanted, along each walk, and whether they are all there: where work
-    /// is stopped, those that the engine has not come to are zero.
+    /// Returns the wanted columns along each walk, and whether all were computed.
+    ///
+    /// Where work is stopped, columns that the engine did not reach are zero.
     pub(super) fn columns(
         &self,
         context: &Context<'_>,
@@ -123,7 +133,8 @@ impl Source<'_> {
         Ok((out, complete))
     }
 
-    /// Fills in the columns that the engine walks for, those together that can be told apart; says whether there was time for all.
+    /// Fills in the columns that need the engine, in shared runs where they can be separated;
+    /// returns whether there was time for all.
     fn walk(
         &self,
         (context, states): (&Context<'_>, &[Vec<f64>]),
@@ -139,10 +150,11 @@ impl Source<'_> {
         let reaches = by_engine.iter().map(|&i| (i, reach(i)));
         let (of_sensors, others): (Vec<_>, Vec<_>) =
             reaches.partition(|(_, reach)| matches!(reach, Reach::Sensor(_)));
-        // What acts on readings leaves the motion as it is, and each sensor's readings are its own.
+        // Effects on readings leave the motion unchanged, and each sensor's readings are its own.
         let mut due = grouped(of_sensors.into_iter());
-        // Of a segment the other columns are those of its whole replay, which no row's slopes take apart; where there are any, a part of the walks
-        // without one has no such slopes either.
+        // A segment's columns are those of its whole replay, which no derivatives of rows can
+        // separate. If there are segments, a part of the walks without one lacks such derivatives
+        // too.
         if self.together && !self.replayed {
             due.extend(grouped(others.into_iter()));
         } else if !self.replayed {
@@ -160,7 +172,7 @@ impl Source<'_> {
             begun = true;
             let rest = due.split_off(SLICE.min(due.len()));
             let balances = self.slice((context, states), (&due, wanted), (model, &entries), out)?;
-            // What reaches further than it says is walked for alone.
+            // Columns that reach further than declared are computed apart.
             let odd = due.into_iter().zip(balances).filter(|(_, fine)| !fine);
             due = odd
                 .flat_map(|(group, _)| group.apart(&context.islands))
@@ -170,7 +182,8 @@ impl Source<'_> {
         Ok(true)
     }
 
-    /// One walk of the engine for some groups; says of each whether its members could be told apart.
+    /// Runs the engine once for some groups; returns for each whether its members could be
+    /// separated.
     fn slice(
         &self,
         (context, states): (&Context<'_>, &[Vec<f64>]),
@@ -197,7 +210,8 @@ impl Source<'_> {
         };
         let wanted_too = (Derivatives::default(), anew);
         let found = map.linearise_anew(&model.theta, states, wanted_too, &[], &variations)?;
-        // Only forces take several columns apart, and where all are walked for alone there may be no slopes in forces.
+        // Only a separation by forces needs derivatives with respect to forces; if every column has
+        // a run of its own, there may be none.
         let by_islands: Vec<Option<Vec<usize>>> =
             groups.iter().map(|g| g.islands(&context.islands)).collect();
         let several = groups.iter().zip(&by_islands);
@@ -212,7 +226,7 @@ impl Source<'_> {
                 retime_columns(&mut linear.reading_columns, time, late, own);
             }
             let (to_states, to_readings) = &mut out[w];
-            // Of a segment there are none: its columns are those of its readings.
+            // A segment has no state columns, only columns of its readings.
             for (k, block) in linear.state_columns.chunks_exact(nx * own).enumerate() {
                 let row = by_forces.then(|| {
                     let steps = context.walks[w].substeps[k];
@@ -259,9 +273,11 @@ impl Source<'_> {
     }
 }
 
-/// Spreads the changes of a row (`block`, as many numbers of each group as `change` holds) to the columns of the groups' members (`to`):
-/// those of a group of one as they are, the others as `apart` takes them apart. It is given the group's place, its changes and
-/// what sets a member's.
+/// Distributes the changes of a row (`block`, as many numbers per group as `change` holds) to the
+/// columns of the groups' members (`to`).
+///
+/// The changes of a group of one are copied. Others are separated by `apart`, which receives the
+/// group's place, its changes and a setter for its members.
 fn spread(
     block: &[f64],
     (groups, wanted): (&[Group], &[Wanted]),

@@ -1,9 +1,10 @@
-//! Columns that one walk of the engine can tell apart.
+//! Columns that share one simulation and are separated afterwards.
 //!
-//! Friction at each of ten joints is ten columns, and one simulation that has all ten: what happened to the speeds over a
-//! row says by the slopes in forces which joint each part of it came from. So the engine walks once for all columns whose
-//! effects reach different joints, or different sensors: the grouping of Curtis, Powell and Reid (1974) for sparse
-//! Jacobians, with the force as the space in which the matrix is sparse.
+//! Friction at each of ten joints is ten columns, but one simulation can contain all ten. The
+//! change of the speeds over a row, with the derivatives with respect to forces, shows which joint
+//! each part came from. So the engine runs once for all columns whose effects reach different
+//! joints or different sensors. This is the grouping of Curtis, Powell and Reid (1974) for sparse
+//! Jacobians, with force as the space in which the matrix is sparse.
 
 use asid_effects::Reach;
 use nalgebra::DVector;
@@ -14,59 +15,66 @@ use crate::latent_force::islands::Islands;
 use super::force_response::Row;
 use super::group::Group;
 
-/// Share of what a group makes, by magnitude, that may come up where no member reaches: more, and one reaches further than
-/// it says. Differences are right to a thousandth of it.
+/// Fraction of a group's total, by magnitude, that may appear where no member reaches.
+///
+/// With more, a member reaches further than it declares. Differences are right to a thousandth of
+/// it.
 const ELSEWHERE: f64 = 0.01;
 
-/// Change of a reading, in deviations of its noise, that is none: the rotation between two orientations that are the same is one
-/// of 1e-17 rad.
+/// Change of a reading that counts as none, in standard deviations of its noise: the computed
+/// rotation between two equal orientations is 1e-17 rad.
 const NO_CHANGE: f64 = 1e-6;
-/// Change of a coordinate of the state, relative to its largest, that is none, for the same reason.
+/// Change of a state coordinate that counts as none, relative to its largest value, for the same
+/// reason.
 const NO_MOTION: f64 = 1e-12;
 
 /// The entries of a row of readings.
 pub(super) struct Entries {
-    /// The sensor of each, by index in the layout.
+    /// Sensor of each entry, by index in the layout.
     pub(super) sensors: Vec<usize>,
-    /// The least change of each that counts, in its unit.
+    /// Smallest change of each entry that counts, in its unit.
     least: Vec<f64>,
 }
 
 impl Entries {
-    /// Of the logs that are compared.
+    /// Returns the entries of the logs that are compared.
     pub(super) fn of(context: &Context<'_>) -> Self {
         let noise = context.logs.entry_noise();
         Self {
-            // A sensor that the layout lacks is no effect's own.
+            // A sensor that the layout lacks is not the sensor of any effect.
             sensors: context.entry_sensors(),
             least: noise.iter().map(|n| NO_CHANGE * n).collect(),
         }
     }
 }
 
-/// How the changes of a group came out.
+/// Bookkeeping of how the changes of a group separate.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Account {
-    /// Sum of squares of all that the changes stand for, as forces or in units of the coordinates, and of what is where no member reaches.
+    /// Sum of squares of the whole change, as forces or in units of the coordinates, and of the
+    /// part where no member reaches.
     parts: [f64; 2],
-    /// Whether something came up that members cannot have made.
+    /// Whether a change appeared that no member can have made.
     strange: bool,
 }
 
 impl Account {
-    /// Whether the members reach what they say and nothing else.
+    /// Whether the members reach what they declare and nothing else.
     pub(super) fn balances(&self) -> bool {
         !self.strange && self.parts[1] <= ELSEWHERE.powi(2) * self.parts[0]
     }
 
-    /// Takes note of the change of the state (`nx`, relative to the largest of each) by effects that do not reach it.
+    /// Records the change of the state (`nx`) by effects that do not reach it; `scale` is the
+    /// largest value of each coordinate.
     pub(super) fn still(&mut self, change: &[f64], scale: &[f64]) {
         let mut each = change.iter().zip(scale);
         self.strange |= each.any(|(x, s)| x.abs() > NO_MOTION * s);
     }
 
-    /// Takes the change of the state over a row (`nx`, places before speeds) apart; `set` is given each member's place in the
-    /// group and its part.
+    /// Separates the change of the state over a row (`nx`, positions before speeds) by the forces
+    /// behind it.
+    ///
+    /// `set` receives each member's place in the group and its part.
     pub(super) fn states(
         &mut self,
         group: &Group,
@@ -108,8 +116,10 @@ impl Account {
         }
     }
 
-    /// Takes the change of the state over a row (`nx`, relative to the largest of each, `scale`) apart by the island that each member reaches;
-    /// `set` is given each member's place in the group and its part.
+    /// Separates the change of the state over a row (`nx`) by the island that each member reaches.
+    ///
+    /// `scale` is the largest value of each coordinate. `set` receives each member's place in the
+    /// group and its part.
     pub(super) fn by_islands(
         &mut self,
         (own, islands): (&[usize], &Islands),
@@ -135,7 +145,9 @@ impl Account {
         }
     }
 
-    /// Takes the change of the readings of a row apart; `set` is given the member's place in the group, the entry and its change.
+    /// Separates the change of the readings of a row by sensor.
+    ///
+    /// `set` receives the member's place in the group, the entry and its change.
     pub(super) fn readings(
         &mut self,
         group: &Group,
@@ -161,7 +173,7 @@ mod tests {
     use super::super::group::tests::dofs;
     use super::*;
 
-    /// Two coupled joints, as of an arm: a force at one moves both.
+    /// Two coupled joints, as in an arm: a force at one moves both.
     fn coupled() -> Row {
         let inverse = [1.0, -0.4, -0.4, 2.0];
         let by = |place: f64, speed: f64| -> Vec<f64> {
@@ -175,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_change_is_taken_apart_into_what_each_joint_made() {
-        // 3 N m at the first joint early in the row, -2 N m at the second all along it.
+        // 3 N m at the first joint early in the row, -2 N m at the second throughout it.
         let first = [1.14e-4, -4.56e-5, 0.006, -0.0024];
         let second = [1.6e-4, -8e-4, 0.016, -0.08];
         let both: Vec<f64> = first.iter().zip(&second).map(|(a, b)| a + b).collect();
