@@ -59,7 +59,7 @@ struct Common<'a> {
     readings: Recording,
     /// Largest number of roles in one pass.
     capacity: usize,
-    /// Whether an effect depends on time or on earlier states: one on the drive side or on
+    /// Whether an effect may depend on time or on earlier states: one on commands, forces or
     /// readings.
     depends_on_past: bool,
     /// Whether an effect makes readings depend on earlier ones.
@@ -304,10 +304,10 @@ impl<'a> StepMap<'a> {
         self.parts.iter().map(|p| p.simulator.steps_taken()).sum()
     }
 
-    /// Linearises about a trajectory (`rows x (nq + nv)`, one a walk) at given parameters.
+    /// Linearises about a trajectory (`rows x (nq + nv)`, one per walk) at given parameters.
     ///
-    /// `push` holds the steps of the differences: one a generalized force, or one a coordinate of
-    /// the initial states of segments.
+    /// `push` holds the steps of the differences: one per generalized force, or one per coordinate
+    /// of the initial states of segments.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -397,9 +397,9 @@ impl<'a> StepMap<'a> {
     /// trajectories with the replays.
     ///
     /// Returns, for each walk, the sum of squared residuals of the readings that count, each
-    /// divided by its `variance` (one an entry); 0 for other walks. `most` holds one limit a walk,
-    /// or `None` if it is not replayed. A replay ends once its sum exceeds the limit; the sum is
-    /// then infinite, as where the engine fails.
+    /// divided by its `variance` (one per entry); 0 for other walks. `most` holds one limit per
+    /// walk, or `None` if it is not replayed. A replay ends once its sum exceeds the limit; the sum
+    /// is then infinite, as where the engine fails.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].

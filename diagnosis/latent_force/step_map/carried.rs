@@ -1,8 +1,9 @@
-//! Slopes over a row that are those of one of its physics steps, carried over all of them.
+//! Derivatives over a row, extended from one of its physics steps to all of them.
 //!
-//! With `a` the slope of a step in the state and `b` in a value of the model, those of `n` steps are `a^n` and `(I + a + … + a^(n-1)) b`:
-//! right to second order in the duration of the row, for they are taken in its middle. Where a fit comes to rest hardly depends on
-//! them, only how fast.
+//! With `a` the derivative of a step with respect to the state and `b` that with respect to a value
+//! of the model, those of `n` steps are `a^n` and `(I + a + … + a^(n-1)) b`. They are right to
+//! second order in the row's duration, because they are taken in its middle. The result of a fit
+//! hardly depends on them, only its speed does.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,14 +14,19 @@ use super::role::Role;
 use super::step::{RowBuffers, Stepped};
 use super::{Common, LinearEpisode, Request};
 
-/// Most that a step may multiply a change of a coordinate by. A step is short beside the time constants of what it steps, or its integrator
-/// fails: a change that grows by half within one is a jump between two branches of a law, as where a joint comes to a stop, and its power is
-/// nothing that a row does.
+/// Largest factor by which a step may multiply a change of a coordinate.
+///
+/// A step is short beside the time constants of the machine, or its integrator fails. A change that
+/// grows by half within one step is a jump between two branches of a law, as where a joint comes to
+/// a stop. Its power does not describe the row.
 const MOST_GROWTH: f64 = 1.5;
 
 impl Part {
-    /// The places of the roles that one physics step tells of, and of the others: coordinates of the state, where all of them are there,
-    /// for the power of a matrix takes all of it; and variations that act in each step alike, where their changes can be carried over the row.
+    /// Returns the places of the roles whose derivatives one physics step gives, and of the others.
+    ///
+    /// The first are coordinates of the state, if all of them are present, because the power of a
+    /// matrix needs all of it. They also include variations that act in every step alike, if their
+    /// changes can be extended to the row.
     pub(super) fn told_by_one_step(
         &self,
         c: &Common<'_>,
@@ -41,7 +47,7 @@ impl Part {
         })
     }
 
-    /// What changes in each physics step of a row come to for a walk, fresh or kept; empty where it is not known.
+    /// Returns [`LinearEpisode::carried`] of a walk, fresh or kept; empty where it is unknown.
     fn carried<'r>(
         &self,
         walk: usize,
@@ -57,8 +63,10 @@ impl Part {
         }
     }
 
-    /// Slopes over a row from those of one of its physics steps, which the roles `all` have just taken; from those of the row before where the
-    /// step jumps.
+    /// Extends derivatives to a row from one of its physics steps, which the roles `all` have just
+    /// taken.
+    ///
+    /// Where that step jumps, it uses the derivatives of the row before.
     pub(super) fn carry_over(
         &self,
         c: &Common<'_>,
@@ -114,7 +122,7 @@ impl Part {
                 let (whole, carried) = powers(&of_step, substeps);
                 let steps = out[e].rows - 1;
                 out[e].carried.resize(steps * nx * nx, 0.0);
-                // Row-major, which is what the transpose has in store.
+                // Row-major, which is the storage order of the transpose.
                 out[e].a[at.clone()].copy_from_slice(whole.transpose().as_slice());
                 out[e].carried[at.clone()].copy_from_slice(carried.transpose().as_slice());
                 row.of_step.insert(e, of_step);
@@ -134,12 +142,13 @@ impl Part {
     }
 }
 
-/// Whether a slope of one step is one of a jump, or not a number.
+/// Whether the derivative of one step is that of a jump, or not a number.
 fn jumps(of_step: &DMatrix<f64>) -> bool {
     !of_step.diagonal().iter().all(|g| g.abs() <= MOST_GROWTH)
 }
 
-/// The power `A^n` of a matrix, and the sum of its powers below, `I + A + … + A^(n-1)`, by doubling.
+/// Returns the power `A^n` of a matrix, and the sum `I + A + … + A^(n-1)` of its lower powers, by
+/// doubling.
 fn powers(a: &DMatrix<f64>, n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let size = a.nrows();
     let (mut power, mut sum) = (DMatrix::identity(size, size), DMatrix::zeros(size, size));
@@ -162,7 +171,7 @@ mod tests {
     fn a_joint_that_stops_within_a_step_is_a_jump() {
         let smooth = DMatrix::from_row_slice(2, 2, &[1.0, 1e-3, -30.0, 0.97]);
         assert!(!jumps(&smooth));
-        // Friction that changes its branch between two speeds that are 1e-6 apart.
+        // Friction that changes its branch between two speeds 1e-6 apart.
         let stops = DMatrix::from_row_slice(2, 2, &[1.0, 1e-3, -30.0, -181.0]);
         assert!(jumps(&stops));
         assert!(jumps(&DMatrix::from_element(2, 2, f64::NAN)));

@@ -1,8 +1,9 @@
-//! Sensors that are late: their readings are given to the rows that they tell of.
+//! Late sensors: their readings are assigned to the rows that they measure.
 
 use super::LinearEpisode;
 
-/// How late each entry's reading in row `k` is, s: against the ramp of a position, or of a speed where it reads no position.
+/// Returns the delay of an entry's reading in row `k`, s, from its response to a ramp of a
+/// position, or of a speed if it reads no position.
 fn lag(h: &[f64], ramp: &[f64], time: f64) -> f64 {
     let (place, speed) = h.split_at(h.len() / 2);
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
@@ -17,8 +18,11 @@ fn lag(h: &[f64], ramp: &[f64], time: f64) -> f64 {
     if lag.is_finite() { lag.max(0.0) } else { 0.0 }
 }
 
-/// Gives late readings to the rows that they tell of, so that their slopes are of the state there: a slope taken through a
-/// long delay is right for slow motion only, and a smoother that iterates on it diverges.
+/// Assigns late readings to the rows that they measure, so that their derivatives refer to the
+/// state there.
+///
+/// A derivative through a long delay is right for slow motion only, and a smoother that iterates on
+/// it diverges.
 pub(super) fn retime(
     episode: &mut LinearEpisode,
     time: &[f64],
@@ -44,7 +48,7 @@ pub(super) fn retime(
     for (s, &late) in late.iter().enumerate().filter(|(_, l)| **l > 0.0) {
         let rows_told = told(time, late);
         let mut taken = vec![false; rows];
-        // Forwards: a row is overwritten only after it was moved.
+        // Forwards: a row is overwritten only after it has been moved.
         for (k, to) in rows_told.into_iter().enumerate() {
             let Some(to) = to else {
                 if episode.residual[k * ns + s].is_finite() {
@@ -70,7 +74,8 @@ pub(super) fn retime(
     retime_columns(&mut episode.reading_columns, time, &late, m);
 }
 
-/// For each row, the row that a reading taken then tells of where it is `late` (s); `None` before the first.
+/// For each row: the row that a reading taken then measures if it is `late` (s); `None` before the
+/// first row.
 fn told(time: &[f64], late: f64) -> Vec<Option<usize>> {
     let mut to = 0;
     time.iter()
@@ -87,7 +92,7 @@ fn told(time: &[f64], late: f64) -> Vec<Option<usize>> {
         .collect()
 }
 
-/// Gives columns of late readings (`rows x ns x m`) to the rows that they tell of.
+/// Assigns columns of late readings (`rows x ns x m`) to the rows that they measure.
 pub fn retime_columns(columns: &mut [f64], time: &[f64], late: &[f64], m: usize) {
     let ns = late.len();
     for (s, &late) in late.iter().enumerate().filter(|(_, l)| **l > 0.0) {

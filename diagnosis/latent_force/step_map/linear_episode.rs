@@ -1,60 +1,71 @@
-//! What a linearisation is asked for, and what it gives for one episode.
+//! What a linearisation is asked for, and its result for one episode.
 
-/// A value of the parameters at which the model is evaluated besides the present one: the column is the
-/// change from there to here, divided by `scale`.
+/// A value of the parameters, besides the present one, at which the model is evaluated.
+///
+/// The column is the change from the present value to this one, divided by `scale`.
 #[derive(Clone, Debug)]
 pub struct Variation {
     /// All parameters.
     pub theta: Vec<f64>,
-    /// What the change is divided by.
+    /// Divisor of the change.
     pub scale: f64,
 }
 
 /// What a pass computes besides the defects and residuals.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Derivatives {
-    /// Slopes in the state.
+    /// Derivatives with respect to the state.
     pub state: bool,
-    /// Slopes in generalized forces, with the size of each force (N or N m) that differences are taken over.
+    /// Derivatives with respect to generalized forces held over the row (N or N m).
     pub force: bool,
-    /// Slopes in such forces that act in the first physics step of a row.
+    /// Derivatives with respect to generalized forces in the first physics step of a row.
     pub jolt: bool,
 }
 
-/// One episode, linearised about a trajectory. Matrices are row-major, one a row of the log; states are counted
-/// in tangent coordinates (`nx = 2 nv`), readings in the sensors' units.
+/// One episode, linearised about a trajectory.
+///
+/// Matrices are row-major, one per row of the log. States are in tangent coordinates (`nx = 2 nv`),
+/// readings in the sensors' units.
 #[derive(Clone, Debug, Default)]
 pub struct LinearEpisode {
     /// Number of rows.
     pub rows: usize,
     /// `f(x_k) - x_{k+1}`, `(rows - 1) x nx`; not finite where the engine failed.
     pub defect: Vec<f64>,
-    /// Slope of `f` in the state, `(rows - 1) x nx x nx`.
+    /// Derivative of `f` with respect to the state, `(rows - 1) x nx x nx`.
     pub a: Vec<f64>,
-    /// What a change in each physics step of a row comes to at its end, `(rows - 1) x nx x nx`: the sum of the powers of the slope of one
-    /// step. Empty where the slopes are not those of one step.
+    /// Change at the end of a row per unit change in each of its physics steps,
+    /// `(rows - 1) x nx x nx`.
+    ///
+    /// This is the sum of the powers of one step's derivative. Empty where the derivatives are not
+    /// those of one step.
     pub carried: Vec<f64>,
-    /// Slope of `f` in a generalized force held over the row, `(rows - 1) x nx x nv`.
+    /// Derivative of `f` with respect to a generalized force held over the row,
+    /// `(rows - 1) x nx x nv`.
     pub b: Vec<f64>,
-    /// The same of a force in the first physics step of the row.
+    /// The same for a force in the first physics step of the row.
     pub jolt: Vec<f64>,
     /// `y_k - h(x_k)`, `rows x ns`; NaN where a reading is missing.
     pub residual: Vec<f64>,
-    /// Slope of `h` in the state, `rows x ns x nx`; of a segment the slope in its start.
+    /// Derivative of `h` with respect to the state, `rows x ns x nx`; for a segment, with respect
+    /// to its initial state.
     pub h: Vec<f64>,
-    /// Readings of each entry that tell of before the first row, where a sensor is late; `ns`, or empty for none.
+    /// Number of readings of each entry, for a late sensor, that measure a time before the first
+    /// row; `ns`, or empty for none.
     pub early: Vec<f64>,
-    /// How late the readings of each entry are, s; `ns`, or empty for none.
+    /// Delay of the readings of each entry, s; `ns`, or empty for none.
     pub late: Vec<f64>,
     /// Change of `f` by each variation, `(rows - 1) x nx x m`.
     pub state_columns: Vec<f64>,
-    /// Change of `h` by each variation, `rows x ns x m`; of a segment that of its whole replay.
+    /// Change of `h` by each variation, `rows x ns x m`; for a segment, over its whole replay.
     pub reading_columns: Vec<f64>,
 }
 
 impl LinearEpisode {
-    /// Arrays of what is wanted for so many rows, with nothing in them yet: of `nv` degrees of freedom, `ns` entries of a reading and
-    /// `m` variations. A segment has no slopes from row to row.
+    /// Allocates the wanted arrays, without results.
+    ///
+    /// The sizes are `rows` rows, `nv` degrees of freedom, `ns` entries of a reading and `m`
+    /// variations. A segment has no derivatives from row to row.
     pub(super) fn empty(
         rows: usize,
         (nv, ns, m): (usize, usize, usize),
@@ -78,8 +89,11 @@ impl LinearEpisode {
             reading_columns: vec![0.0; rows * ns * m],
         }
     }
-    /// Coordinates of the start of a segment that its readings tell nothing of: whose slopes, squared, over the readings' variances `r` and times
-    /// how `open` the coordinate is (a variance), add up to less than `least`.
+    /// Flags the coordinates of a segment's initial state about which its readings carry no
+    /// information.
+    ///
+    /// The information is the sum of squared derivatives over the readings' variances `r`, times
+    /// the coordinate's prior variance `open`. It has to reach `least`.
     #[must_use]
     pub fn blind(&self, open: &[f64], r: &[f64], least: f64) -> Vec<bool> {
         let (nx, ns) = (open.len(), r.len());
@@ -100,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_start_is_blind_where_no_reading_that_counts_tells_of_it() {
-        // Two readings a row, of which the first row's do not count.
+        // Two readings per row, of which those of the first row do not count.
         let episode = LinearEpisode {
             rows: 2,
             residual: vec![f64::NAN, f64::NAN, 0.1, f64::NAN],
@@ -114,7 +128,7 @@ mod tests {
             ..LinearEpisode::default()
         };
         let blind = |open: [f64; 3]| episode.blind(&open, &[0.01, 0.01], 0.1);
-        // 4 / 0.01 and 1e-4 / 0.01 for each unit of variance.
+        // 4 / 0.01 and 1e-4 / 0.01 per unit of variance.
         assert_eq!(blind([1.0; 3]), [false, true, true]);
         assert_eq!(blind([1e-6, 1.0, 100.0]), [true, true, false]);
     }

@@ -1,4 +1,5 @@
-//! One walk along the rows: every simulation is set to the trajectory at each row, read, and stepped to the next.
+//! One pass along the rows: every simulation is set to the trajectory at each row, read, and
+//! stepped to the next.
 
 use std::collections::BTreeMap;
 
@@ -13,11 +14,13 @@ use super::role::Role;
 use super::step::{RowBuffers, Stepped};
 use super::{Common, LinearEpisode, Request};
 
-/// Change of a coordinate of the state that derivatives are taken over, rad, m, rad/s or m/s: forward
-/// differences of smooth dynamics in double precision are right to about six digits.
+/// Step of the finite differences in a coordinate of the state, rad, m, rad/s or m/s.
+///
+/// Forward differences of smooth dynamics in double precision are right to about six digits.
 pub(super) const STATE_STEP: f64 = 1e-6;
 
-/// What is wanted of a walk: slopes in its state, the columns of all variations, and the coordinates of its start that need no slope.
+/// What is wanted of a walk: derivatives with respect to its state, columns of all variations, and
+/// the blind coordinates of its initial state.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Class<'r> {
     state: bool,
@@ -25,7 +28,7 @@ struct Class<'r> {
     blind: &'r [bool],
 }
 
-/// Some of the walks on a core of their own: a row is too little work to share out.
+/// The walks of one core: a row is too little work to distribute.
 pub(super) struct Part {
     pub(super) walks: Vec<usize>,
     pub(super) simulator: RefinedSimulator,
@@ -89,7 +92,7 @@ impl Part {
         Ok(episodes)
     }
 
-    /// Its walks by what is wanted of them, one flag a walk.
+    /// Groups its walks by what is wanted of them, one flag per walk.
     fn classes<'r>(&self, c: &Common<'_>, request: Request<'r>) -> BTreeMap<Class<'r>, Vec<bool>> {
         let mut classes = BTreeMap::new();
         for (e, &w) in self.walks.iter().enumerate() {
@@ -106,7 +109,7 @@ impl Part {
         classes
     }
 
-    /// One walk along some of the episodes with some roles beside the nominal one.
+    /// Runs one pass along some of the episodes, for some roles in addition to the nominal one.
     fn pass(
         &mut self,
         c: &Common<'_>,
@@ -161,7 +164,8 @@ impl Part {
         Ok(())
     }
 
-    /// Puts all simulations of some episodes at row `k`; those of segments go on by themselves from the first row on.
+    /// Places all simulations of some episodes at row `k`; those of segments only at the first row,
+    /// as they run on by themselves.
     fn place(
         &mut self,
         c: &Common<'_>,
@@ -226,7 +230,7 @@ impl Part {
                 row.qvel.extend_from_slice(&state[nq..]);
             }
         }
-        // A simulation that failed at the row before begins anew.
+        // A simulation that failed at the row before is reset.
         self.begin_anew(&row.sims)?;
         self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
     }

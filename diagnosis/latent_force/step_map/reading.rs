@@ -1,4 +1,4 @@
-//! Readings at a row, and their slopes.
+//! Readings at a row, and their derivatives.
 
 use asid_core::{Result, Simulator as _};
 
@@ -8,8 +8,10 @@ use super::step::RowBuffers;
 use super::{Common, LinearEpisode, Request};
 
 impl Part {
-    /// The places of the roles that are read at row `k`; all of them where some walks go on by themselves. A slope in a force tells of
-    /// the next state alone.
+    /// Returns the places of the roles that are read at row `k`; all of them where some walks run
+    /// on by themselves.
+    ///
+    /// A derivative with respect to a force concerns the next state alone.
     fn read_at(
         &self,
         c: &Common<'_>,
@@ -64,7 +66,7 @@ impl Part {
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let Ok(at) = read.binary_search(&v) else {
                     if let Role::State(slot) = *role {
-                        // The slopes of coordinates that are read as they are.
+                        // The derivatives of coordinates that are read directly.
                         for i in c.islands.moved(slot) {
                             for s in 0..ns {
                                 out[e].h[(k * ns + s) * nx + i] = out[e].h[s * nx + i];

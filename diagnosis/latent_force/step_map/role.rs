@@ -1,30 +1,37 @@
-//! Roles of the simulations of an episode: the model as it is, and one for each column of its derivatives.
+//! Roles of the simulations of an episode: the unperturbed model, and one per column of its
+//! derivatives.
 
 use super::Derivatives;
 
-/// What one simulation an episode is for.
+/// Purpose of one simulation per episode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Role {
-    /// The model as it is.
+    /// The unperturbed model.
     Nominal,
-    /// Coordinates of the state that nothing couples are moved, one of each [island](super::Islands), for `f` and `h`.
+    /// Perturbs uncoupled coordinates of the state, one of each [island](super::Islands), for `f`
+    /// and `h`.
     State(usize),
-    /// A coordinate of the state is moved all along, for `h` alone: a position by a constant, a speed by a constant and its
-    /// position by a ramp. A reading that remembers (a delay, a filter) sees the past of a speed as its position; what the
-    /// ramp has reached now is taken off again.
+    /// Perturbs a coordinate of the state throughout, for `h` alone.
+    ///
+    /// A position is perturbed by a constant, a speed by a constant and its position by a ramp. A
+    /// reading with memory (a delay, a filter) sees the past of a speed through its position. The
+    /// present value of the ramp is subtracted again.
     Reading(usize),
-    /// A speed is moved by a ramp, for how late a sensor of speeds is.
+    /// Perturbs a speed by a ramp, which shows the delay of a sensor of speeds.
     Ramp(usize),
-    /// Generalized forces act all along the row, one at each island.
+    /// Applies generalized forces throughout the row, one per island.
     Force(usize),
-    /// They act in the first physics step of the row.
+    /// Applies these forces in the first physics step of the row.
     Jolt(usize),
     /// A variation of the parameters.
     Varied(usize),
 }
 
 impl Role {
-    /// Those for the slopes in the state, by so many pushes; where readings remember, also those that are moved all along.
+    /// Returns the roles for derivatives with respect to the state.
+    ///
+    /// `slots` perturbations cover all degrees of freedom. Where readings have memory, the roles
+    /// include the perturbations throughout.
     pub(super) fn in_state((slots, nv): (usize, usize), remembers_readings: bool) -> Vec<Self> {
         let mut roles: Vec<Self> = (0..2 * slots).map(Self::State).collect();
         if remembers_readings {
@@ -34,7 +41,7 @@ impl Role {
         roles
     }
 
-    /// Those for the slopes in forces and for some variations.
+    /// Returns the roles for derivatives with respect to forces and for some variations.
     pub(super) fn others(slots: usize, want: Derivatives, variations: usize) -> Vec<Self> {
         let mut roles = Vec::new();
         if want.force {
@@ -47,12 +54,13 @@ impl Role {
         roles
     }
 
-    /// Whether it is placed and read at each row, and never stepped.
+    /// Whether the role is placed and read at each row, and never stepped.
     pub(super) fn is_read_alone(self) -> bool {
         matches!(self, Self::Reading(_) | Self::Ramp(_))
     }
 
-    /// Which coordinates of the state it moves for `f`; see [`Islands::moved`](super::Islands::moved).
+    /// Returns which coordinates of the state the role perturbs for `f`; see
+    /// [`Islands::moved`](super::Islands::moved).
     pub(super) fn slot(self) -> Option<usize> {
         match self {
             Self::State(i) => Some(i),

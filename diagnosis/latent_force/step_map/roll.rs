@@ -1,4 +1,4 @@
-//! Replays of short segments from their first rows, and readings there.
+//! Replays of short segments from their initial states, and readings there.
 
 use asid_core::{Control, Result, Rollout, Simulator as _};
 
@@ -8,7 +8,8 @@ use super::Common;
 use super::pass::Part;
 
 impl Part {
-    /// Puts some of its walks' simulations at states (`nq + nv`), with values.
+    /// Sets the parameters of some of its walks' simulations, and places them at given states
+    /// (`nq + nv`).
     fn begin_at(
         &mut self,
         c: &Common<'_>,
@@ -28,7 +29,7 @@ impl Part {
         self.simulator.set_state(which, &qpos, &qvel)
     }
 
-    /// What the logs' sensors read at a state of each of its walks.
+    /// Returns what the logs' sensors read at a state of each of its walks.
     pub(super) fn readings_at(
         &mut self,
         c: &Common<'_>,
@@ -44,7 +45,7 @@ impl Part {
         Ok(each.map(<[f64]>::to_vec).collect())
     }
 
-    /// Replays some of its segments as [`StepMap::roll`](super::StepMap::roll).
+    /// Replays some of its segments; see [`StepMap::roll`](super::StepMap::roll).
     pub(super) fn roll(
         &mut self,
         c: &Common<'_>,

@@ -1,28 +1,31 @@
 //! What readings depend on: a sensor of a joint's position or speed reads the state itself.
 //!
-//! Reading a simulation costs as much as half a physics step. Where all sensors read the state, their slopes in it are the same in each row, and
-//! what is no effect on readings does not change them.
+//! Reading a simulation costs as much as half a physics step. If all sensors read the state, their
+//! derivatives with respect to it are the same in each row. Only effects on readings then change
+//! the readings of a state.
 
 use asid_core::Parameter;
 use asid_core::layout::Sensor;
 
 use crate::data::Logs;
 
-/// Sensors whose reading is a coordinate of the state.
+/// Kinds of sensors that read a coordinate of the state.
 const OF_THE_STATE: [&str; 2] = ["jointpos", "jointvel"];
 
 /// What the readings of some logs depend on.
 pub(super) struct Sensors {
-    /// Whether all of them are coordinates of the state, effects on readings aside.
+    /// Whether all of them are coordinates of the state, apart from effects on readings.
     pub(super) read_the_state: bool,
-    /// Whether there are such effects: a reading may then be any function of what it was.
+    /// Whether there are effects on readings, which may make a reading any function of its former
+    /// value.
     pub(super) change: bool,
-    /// Whether each parameter is of one.
+    /// Whether each parameter belongs to an effect on readings.
     pub(super) of_readings: Vec<bool>,
 }
 
 impl Sensors {
-    /// Of the sensors of a machine that logs have columns of; `on_readings` are the labels of the effects on readings.
+    /// Builds it for the sensors of a machine that the logs contain; `on_readings` are the labels
+    /// of the effects on readings.
     pub(super) fn of(
         sensors: &[Sensor],
         logs: &Logs,

@@ -1,8 +1,8 @@
-//! Walks shared out among cores: a row is too little work to share out.
+//! Distribution of walks among cores: a row is too little work to distribute.
 
 use crate::latent_force::walk::Walk;
 
-/// Shares walks out among cores, the longest first, each to the one that has least.
+/// Distributes walks among cores, the longest first, each to the core with the least work.
 pub(super) fn share_out(walks: &[Walk], cores: usize) -> Vec<Vec<usize>> {
     let mut order: Vec<usize> = (0..walks.len()).collect();
     order.sort_by_key(|&w| std::cmp::Reverse(walks[w].len()));
@@ -35,9 +35,9 @@ mod tests {
             segment: None,
         };
         let walks: Vec<Walk> = [3, 9, 4, 5, 2].map(walk).into();
-        // 9 and 3 rows against 5, 4 and 2.
+        // 9 and 3 rows for one core; 5, 4 and 2 for the other.
         assert_eq!(share_out(&walks, 2), [vec![0, 1], vec![2, 3, 4]]);
-        // No core without a walk, and every walk once.
+        // No core is without a walk, and every walk occurs once.
         assert_eq!(share_out(&walks, 8).concat().len(), 5);
         assert_eq!(share_out(&walks, 8).len(), 5);
         assert_eq!(share_out(&walks, 0), [vec![0, 1, 2, 3, 4]]);

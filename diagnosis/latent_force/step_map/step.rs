@@ -1,8 +1,9 @@
 //! Steps of all simulations from one row to the next.
 //!
-//! Slopes cost most: one simulation for each coordinate of the state, and for each value. Where a row is many physics steps they are those of
-//! one step in its middle, carried over all of them ([`super::carried`]), unless a change is answered over several steps
-//! ([`one_step_tells`](crate::latent_force::one_step::one_step_tells)).
+//! Derivatives are the largest cost: one simulation per coordinate of the state, and one per value.
+//! Where a row consists of many physics steps, they are those of one step in its middle, extended
+//! to all of them ([`super::carried`]). This does not hold where the response to a change takes
+//! several steps ([`one_step_tells`](crate::latent_force::one_step::one_step_tells)).
 
 use std::collections::HashMap;
 
@@ -16,15 +17,16 @@ use super::pass::{Part, STATE_STEP};
 use super::role::Role;
 use super::{Common, LinearEpisode, Request};
 
-/// Fewest physics steps of a row whose slopes are those of one of them: placing a simulation costs about as much as a step.
+/// Fewest physics steps of a row for derivatives from one step: placing a simulation costs about as
+/// much as a step.
 const MANY: usize = 4;
 
-/// Generalized forces on some rows of a rollout.
+/// Generalized forces applied to some rows of a rollout.
 struct Push<'a> {
     islands: &'a Islands,
     /// The force at each degree of freedom.
     force: &'a [f64],
-    /// For each row of the rollout, which are pushed, and whether in the first physics step alone.
+    /// For each row of the rollout: which forces act, and whether in the first physics step alone.
     rows: &'a [Option<(usize, bool)>],
 }
 
@@ -40,7 +42,8 @@ impl StepHook for Push<'_> {
     }
 }
 
-/// What is stepped together: the roles, the walks (by their places in the part), the row, and its physics steps.
+/// What is stepped together: roles, walks (by their places in the part), the row, and its physics
+/// steps.
 #[derive(Clone, Copy)]
 pub(super) struct Stepped<'s> {
     pub(super) roles: &'s [Role],
@@ -50,7 +53,7 @@ pub(super) struct Stepped<'s> {
 }
 
 impl Part {
-    /// Steps some walks from a row to the next, and takes differences there.
+    /// Steps some walks from a row to the next, and takes the differences there.
     pub(super) fn step_row(
         &mut self,
         c: &Common<'_>,
@@ -133,7 +136,7 @@ impl Part {
         Ok(())
     }
 
-    /// Takes some physics steps of a row in some of the roles; their states come into `row.next`.
+    /// Takes some physics steps of a row in some roles; writes their states to `row.next`.
     fn advance(
         &mut self,
         c: &Common<'_>,
@@ -179,8 +182,11 @@ impl Part {
         self.simulator.rollout(&rollout, &mut row.next)
     }
 
-    /// Places simulations of some roles where the nominal ones have come to, which are the first of `row.next`, each of a slope in the state with
-    /// its coordinate moved. Where the engine has failed they begin at the row.
+    /// Places the simulations of some roles at the present states of the nominal ones, the first of
+    /// `row.next`.
+    ///
+    /// Those for derivatives with respect to the state have their coordinate moved. Where the
+    /// engine has failed, they begin at the row.
     fn place_at_nominal(
         &mut self,
         c: &Common<'_>,
@@ -218,7 +224,7 @@ impl Part {
         self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
     }
 
-    /// Resets those simulations that have failed.
+    /// Resets the simulations that have failed.
     pub(super) fn begin_anew(&mut self, sims: &[usize]) -> Result<()> {
         let status = self.simulator.status();
         let failed = sims.iter().copied().filter(|&s| !status[s].is_running());
@@ -240,12 +246,12 @@ pub(super) struct RowBuffers {
     pushes: Vec<Option<(usize, bool)>>,
     pub(super) read: Vec<f64>,
     next: Vec<f64>,
-    /// The last slope of one step of each walk that is no jump.
+    /// The last derivative of one step of each walk that is not a jump.
     pub(super) of_step: HashMap<usize, DMatrix<f64>>,
 }
 
 impl RowBuffers {
-    /// One of the states that were stepped to, of some width.
+    /// Returns one of the stepped states, of the given width.
     pub(super) fn state(&self, place: usize, width: usize) -> &[f64] {
         &self.next[place * width..(place + 1) * width]
     }
