@@ -1,8 +1,9 @@
 //! Trajectory, missing force and noise of all episodes, estimated by expectation maximisation.
 //!
-//! The smoother gives the trajectory and the missing force for given covariances; these follow from it (Shumway and
-//! Stoffer 1982): `q` and `tau` from the force and its products over a row, `r` from what is left of
-//! the readings. Between linearisations a few rounds are taken, lengthened, for EM is slow where a variance is small.
+//! For given covariances, the smoother gives the trajectory and the missing force. The covariances
+//! follow from these (Shumway and Stoffer 1982): `q` and `tau` from the force and its products over
+//! a row, `r` from the residuals of the readings. A few rounds run between linearisations. Their
+//! steps are lengthened, because EM is slow where a variance is small.
 
 mod before;
 mod missing;
@@ -21,32 +22,41 @@ use super::tangent::{difference, retract};
 
 pub use missing::{LEAST_LEFT, Missing, NOTHING};
 
-/// Multiple of a step of EM in the logarithm of a variance: between 1 and 2 EM still rises (Lange 1995).
+/// Factor on a step of EM in the logarithm of a variance: between 1 and 2 EM still raises the
+/// likelihood (Lange 1995).
 const LENGTHENED: f64 = 1.7;
 
 /// Trajectory, force and noise.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// States, `rows x (nq + nv)`, one a walk.
+    /// States, `rows x (nq + nv)`, one array per walk.
     pub trajectory: Vec<Vec<f64>>,
-    /// Where segments begin by their readings, `nq + nv`, one a walk, in the model at its values.
+    /// Initial states of segments according to their readings, `nq + nv`, one per walk, in the
+    /// model at its values.
     pub read: Vec<Vec<f64>>,
     /// Covariances.
     pub noise: NoiseModel,
-    /// Slopes in generalized forces of the model without effects, one a walk.
+    /// Derivatives with respect to generalized forces of the model without effects, one array per
+    /// walk.
     pub b: Vec<Vec<f64>>,
-    /// Variance of the force that may hold a joint at rest, or that a drive makes of what was before the log, `rows x nv`, one a walk; empty for none.
+    /// Variance of the free force, `rows x nv`, one array per walk; empty for none.
+    ///
+    /// This force may hold a joint at rest, or stand for the state of a drive before the log.
     pub free: Vec<Vec<f64>>,
-    /// Directions in which the replays of each segment scatter, `rows x ns x directions`; empty for none.
+    /// Directions in which the replays of each segment scatter, `rows x ns x directions`; empty for
+    /// none.
     pub scatter: Vec<Vec<f64>>,
-    /// Least variance of the white part of each force.
+    /// Smallest variance of the white part of each force.
     pub least_white: Vec<f64>,
-    /// Of each segment: variance of what is left of its readings, relative to that of the readings; 1 for other walks.
+    /// For each segment: variance of its residuals relative to that of the readings; 1 for other
+    /// walks.
     pub excess: Vec<f64>,
-    /// Of each segment: what its last replay left of its readings, relative to what the slopes before it promised, 1 at least.
-    /// Slopes that do not keep their promise tell as little of effects.
+    /// For each segment: squared residuals of its last replay relative to those that its
+    /// derivatives predicted, at least 1.
+    ///
+    /// Derivatives that mispredict carry less information about effects.
     pub misled: Vec<f64>,
-    /// How often segments were replayed, so that each time others are drawn.
+    /// Number of times that segments were replayed; seeds the draws of each time.
     pub rolls: u64,
     /// The last smoothing, about the trajectory before it.
     pub smoothed: Vec<Smoothed>,
@@ -55,7 +65,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The problem of each walk; `starts` as [`Context::starts`] has them.
+    /// Returns the problem of each walk; `starts` as [`Context::starts`] returns them.
     pub fn problems<'p>(
         &'p self,
         context: &'p Context<'_>,
@@ -80,7 +90,8 @@ impl Estimate {
             })
     }
 
-    /// The noise of a walk, that of forces and of what segments leave scaled.
+    /// Returns the noise of a walk, with the variances of the missing force or of a segment's
+    /// residuals scaled.
     #[must_use]
     pub fn noise_along(&self, context: &Context<'_>, walk: usize, scale: f64) -> NoiseModel {
         if context.walks[walk].segment.is_none() {
@@ -96,7 +107,7 @@ impl Estimate {
         }
     }
 
-    /// Scales the variances of the missing force and of what segments leave.
+    /// Scales the variances of the missing force and of the segments' residuals.
     pub fn rescale(&mut self, scale: f64) {
         self.noise = self.noise.scaled(scale, &self.least_white);
         self.excess
@@ -104,8 +115,10 @@ impl Estimate {
             .for_each(|x| *x = (scale * *x).max(1.0));
     }
 
-    /// Roots of the posterior covariance of where each segment begins, `nx` rows, by the noise of the readings alone: as well as a right
-    /// model would know it. Empty for other walks.
+    /// Returns roots of the posterior covariance of each segment's initial state, `nx` rows; empty
+    /// for other walks.
+    ///
+    /// The noise is that of the readings alone, so the covariance is that of a correct model.
     #[must_use]
     pub fn start_roots(
         &self,
@@ -127,7 +140,8 @@ impl Estimate {
             .collect()
     }
 
-    /// Smooths about the present trajectory, fits the noise over some rounds, and moves the trajectory.
+    /// Smooths about the present trajectory, fits the noise over some rounds, and moves the
+    /// trajectory.
     pub fn improve(&mut self, context: &Context<'_>, linear: &[LinearEpisode], rounds: usize) {
         let starts = context.starts(&self.trajectory, &self.read);
         let mut length = LENGTHENED;
@@ -162,7 +176,7 @@ impl Estimate {
         let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
         let pairs = self.trajectory.iter_mut().zip(&self.smoothed);
         for ((states, smoothed), walk) in pairs.zip(&context.walks) {
-            // A segment is replayed from its start.
+            // A segment is replayed from its initial state.
             let rows = if walk.segment.is_some() {
                 1
             } else {
@@ -177,7 +191,7 @@ impl Estimate {
         }
     }
 
-    /// Part of the way from here to what [`Estimate::improve`] made of it.
+    /// Returns a point part of the way from here to the result of [`Estimate::improve`], `there`.
     #[must_use]
     pub fn towards(&self, context: &Context<'_>, there: &Self, part: f64) -> Self {
         let layout = &context.plant().layout;

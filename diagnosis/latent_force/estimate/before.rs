@@ -1,18 +1,25 @@
-//! What a drive remembers of the time before its log.
+//! Free force for the state of a drive before its log.
 
 use crate::latent_force::context::Context;
 
 use super::Estimate;
 
-/// Time from a log's first row on within which a drive's past counts, s: rotors of servos settle behind a spring or a gap, and commands arrive, within
-/// some tens of milliseconds. Longer: more of each log says nothing of its driven joints.
+/// Time after a log's first row during which a drive's past counts, s.
+///
+/// Rotors of servos settle behind a spring or a gap, and commands arrive, within some tens of
+/// milliseconds. Over a longer time, more of each log would carry no information about its driven
+/// joints.
 const SECONDS: f64 = 0.05;
 
 impl Estimate {
-    /// Lets any force as large as its inertial ones act on each driven joint that moves at its log's first row, while its drive still shows what was
-    /// before, in every model alike. Where a rotor stands behind its spring or in its gap, and which commands are on their way, no log
-    /// says; a model begins as if the first command had been held for long, and a joint that moves has not stood so. What that leaves rings on, and the
-    /// name that explains the rest of the log would be the less likely for it.
+    /// Lets a force as large as its inertial forces act on each driven joint that moves at its
+    /// log's first row, in every model alike.
+    ///
+    /// It acts while the drive still depends on its state before the log. No log records where a
+    /// rotor stands behind its spring or in its gap, or which commands are on their way. A model
+    /// begins as if the first command had been held for long, but a joint that moves was not at
+    /// rest under it. The resulting error keeps ringing, and would lower the evidence of the effect
+    /// that explains the rest of the log.
     pub fn free_at_start(&mut self, context: &Context<'_>) {
         let layout = &context.plant().layout;
         let nv = layout.nv;

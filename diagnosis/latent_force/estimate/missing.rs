@@ -1,31 +1,36 @@
-//! What the model lacks: the missing force along walks, and what segments leave.
+//! What the model lacks: the missing force along walks, and the residuals of segments.
 
 use crate::latent_force::context::Context;
 
 use super::Estimate;
 
-/// Mean square of what is left of readings, beyond their noise and in units of it, that counts as nothing: a gap of 1.05.
+/// Mean square of residuals that counts as zero, beyond the noise and in units of it: a gap of
+/// 1.05.
 pub const LEAST_LEFT: f64 = 0.1;
-/// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
+/// Root mean square of the missing force, relative to the inertial forces, below which nothing is
+/// missing.
 pub const NOTHING: f64 = 0.01;
-/// Least deviation of the white part, relative to what is missing without any effect: what is finer decides
-/// nothing, for no law of friction or of a drive is the machine's own to the last digit.
+/// Smallest standard deviation of the white part, relative to the missing force without any effect.
+///
+/// Finer differences decide nothing: no law of friction or of a drive matches a machine to the last
+/// digit.
 const LEAST_WHITE: f64 = 0.1;
 
 /// What a model lacks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Missing {
-    /// Power of the missing force where it is smoothed, beyond what is too fine to decide, in units of the inertial forces,
-    /// over all degrees of freedom.
+    /// Power of the missing force along smoothed walks, beyond the resolution, in units of the
+    /// inertial forces, summed over all degrees of freedom.
     pub force: f64,
-    /// Mean square of what segments leave of their readings beyond the noise, in units of it.
+    /// Mean square of the segments' residuals beyond the noise, in units of it.
     pub readings: f64,
-    /// Share of the rows that are in segments.
+    /// Share of the rows that belong to segments.
     pub share: f64,
 }
 
 impl Missing {
-    /// Relative to what another model lacks, of force and of readings by their shares of the rows.
+    /// Returns the ratio to what another model lacks; force and readings are weighted by their
+    /// shares of the rows.
     #[must_use]
     pub fn relative_to(self, other: Self) -> f64 {
         let force = self.force / other.force.max(f64::MIN_POSITIVE);
@@ -35,15 +40,18 @@ impl Missing {
 }
 
 impl Estimate {
-    /// Power of the missing force at a degree of freedom, beyond what is too fine to decide, in units of the inertial forces there.
+    /// Returns the power of the missing force at a degree of freedom, beyond the resolution, in
+    /// units of the inertial forces there.
     fn missing_at(&self, context: &Context<'_>, dof: usize) -> f64 {
         let noise = &self.noise;
         let beyond = noise.q[dof] + noise.white[dof] - self.least_white[dof];
         beyond.max(0.0) / context.inertial[dof].powi(2)
     }
 
-    /// Whether a model lacks less than a `share` of the power of the force that this one lacks, at some degree of freedom where that is more than
-    /// nothing. Beside a large force that is missing elsewhere it may be hardly any of all.
+    /// Whether `other` lacks less than a `share` of the power that this model lacks, at some degree
+    /// of freedom where that is more than nothing.
+    ///
+    /// Compared with a large missing force elsewhere, that power may be a small part of the total.
     #[must_use]
     pub fn is_made_up_for_by(&self, other: &Self, context: &Context<'_>, share: f64) -> bool {
         let is_smoothed = context.walks.iter().any(|w| w.segment.is_none());
@@ -54,7 +62,7 @@ impl Estimate {
             })
     }
 
-    /// What the model lacks.
+    /// Returns what the model lacks.
     #[must_use]
     pub fn missing(&self, context: &Context<'_>) -> Missing {
         let power = |j: usize| self.missing_at(context, j);
@@ -82,7 +90,8 @@ impl Estimate {
         }
     }
 
-    /// From here on nothing finer than a part of the force that is missing now decides.
+    /// Sets the resolution: from here on, nothing finer than a part of the present missing force
+    /// decides.
     pub fn set_resolution(&mut self, context: &Context<'_>) {
         let nv = context.plant().layout.nv;
         for j in 0..nv {
@@ -94,7 +103,7 @@ impl Estimate {
         }
     }
 
-    /// The missing force at a degree of freedom, along all walks that are smoothed.
+    /// Returns the missing force at a degree of freedom, along all smoothed walks.
     fn forces<'s>(
         &'s self,
         context: &'s Context<'_>,
@@ -107,7 +116,7 @@ impl Estimate {
             .flat_map(move |(s, _)| s.force.iter().skip(dof).step_by(nv).copied())
     }
 
-    /// Quantile of the magnitude of the missing force at each degree of freedom.
+    /// Returns a quantile of the magnitude of the missing force at each degree of freedom.
     #[must_use]
     pub fn force_quantile(&self, context: &Context<'_>, quantile: f64) -> Vec<f64> {
         (0..context.plant().layout.nv)

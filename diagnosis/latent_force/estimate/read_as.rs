@@ -1,8 +1,11 @@
-//! Where segments begin by their readings, in a model that reads otherwise than the one as given.
+//! Initial states of segments according to their readings, in a model that reads differently from
+//! the given one.
 //!
-//! A reading that is shifted puts what it reads elsewhere. A ball that seems to come to rest three centimetres above its floor was thrown from three
-//! centimetres lower, too. By slopes a start does not find there: each bounce that comes earlier or later is a valley of its own. So where the model's
-//! readings change, the starts that leave them as they were are tried beside those to which slopes lead.
+//! A shift of a reading also shifts the position that it stands for. A ball that seems to come to
+//! rest 3 cm above its floor was also thrown from 3 cm lower. Derivatives do not lead an initial
+//! state there, because each bounce that comes earlier or later is a local minimum of its own. So
+//! where the model's readings change, the initial states that leave the readings unchanged are
+//! tried in addition to those that derivatives suggest.
 
 use asid_core::Result;
 
@@ -14,8 +17,10 @@ use crate::latent_force::tangent::{difference, retract};
 use super::Estimate;
 
 impl Estimate {
-    /// Puts where segments begin by their readings to where a model at some values has what reads so; returns the changes, `nx` one a walk, or
-    /// nothing where nothing changes.
+    /// Updates the segments' initial states according to their readings, so that the model at given
+    /// values reads the same there.
+    ///
+    /// Returns the changes, `nx` per walk, or nothing if nothing changes.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -56,8 +61,9 @@ impl Estimate {
         Ok(if moves { changes } else { Vec::new() })
     }
 
-    /// Replays the segments from starts `before` that follow their readings by some `changes`; where that leaves less of the readings than what
-    /// is `left` by now, the segment takes it.
+    /// Replays the segments from initial states `before` that follow their readings by `changes`.
+    ///
+    /// A segment takes its replay if that leaves less than the residuals `left` so far.
     pub(super) fn follow(
         &mut self,
         map: &mut StepMap<'_>,

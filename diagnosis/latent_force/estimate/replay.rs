@@ -1,4 +1,4 @@
-//! Replays of segments from starts that have been moved.
+//! Replays of segments from changed initial states.
 
 use asid_core::Result;
 use asid_core::rng::Streams;
@@ -14,25 +14,31 @@ use crate::latent_force::walk::Walk;
 
 use super::Estimate;
 
-/// What a step of a segment's start may leave of its readings, relative to what its slopes promised.
+/// Residuals that a step of a segment's initial state may leave, relative to those that its
+/// derivatives predicted.
 const KEPT_PROMISE: f64 = 1.1;
-/// Widths of the starts that are drawn where no step keeps its promise, in deviations of the start's posterior, which has the shape of
-/// the valley where the slopes are right. A touch that begins a row earlier or later is another valley, and no slope leads there.
+/// Widths of the draws of an initial state where no step achieves its prediction, in standard
+/// deviations of its posterior.
+///
+/// The posterior has the shape of the valley where the derivatives are right. A contact that begins
+/// a row earlier or later is another valley, to which no derivative leads.
 const BY_POSTERIOR: [f64; 3] = [0.5, 2.0, 8.0];
-/// The same in deviations of what its readings leave open and of what is known of it before, for where the slopes are wrong.
+/// The same in standard deviations of what the readings, or the prior if it is narrower, leave
+/// open, for where the derivatives are wrong.
 const BY_READING: [f64; 3] = [0.03, 0.1, 0.3];
 /// Draws of each width.
 const DRAWS: usize = 4;
 
 impl Estimate {
-    /// Begins each segment where another estimate, of the same logs in other segments, has its first row.
+    /// Sets the initial state of each segment to the state of another estimate in that row; the
+    /// other has the same logs in other segments.
     pub fn begin_at(&mut self, context: &Context<'_>, (others, other): (&Context<'_>, &Self)) {
         let layout = &context.plant().layout;
         let width = layout.nq + layout.nv;
         for (walk, states) in context.walks.iter().zip(&mut self.trajectory) {
             let first = walk.rows[0];
             let place = |w: &Walk| w.rows.iter().position(|&row| row == first);
-            // Of several, the one that has gone furthest from its start knows the row best.
+            // Of several, the one that is furthest from its own initial state knows the row best.
             let found = others.walks.iter().zip(&other.trajectory);
             let found = found
                 .filter(|(w, _)| w.episode == walk.episode && w.segment.is_some())
@@ -44,9 +50,12 @@ impl Estimate {
         }
     }
 
-    /// Replays the segments from their starts, which have just been moved from those `before`: each takes the step, of those
-    /// offered, none, and the one that [follows its reading](Self::read_as), that leaves least of its readings; where that is more than was promised,
-    /// starts about it are drawn.
+    /// Replays the segments from their initial states, which have just been moved from those
+    /// `before`.
+    ///
+    /// Each segment takes the step with the smallest residuals. The choices are the steps on offer,
+    /// no step, and the one that [follows its reading](Self::read_as). Where the residuals exceed
+    /// the prediction, it also draws initial states about the present one.
     ///
     /// # Errors
     /// When the engine fails.
@@ -78,7 +87,7 @@ impl Estimate {
         }
         self.rolls += 1;
         let mut random = Streams::new(self.rolls).stream("starts of segments");
-        // A start that the log gives is hardly open.
+        // The log gives some initial states, which are hardly uncertain.
         let starts = context.starts(before, &self.read);
         let scales = (&context.scale[..], &context.position_noise[..]);
         for _ in 0..DRAWS {
@@ -112,8 +121,10 @@ impl Estimate {
         Ok(())
     }
 
-    /// Replays the segments that leave more than was promised from other starts, which are those `from` changed; where that
-    /// leaves less, the segment takes it.
+    /// Replays the segments whose residuals exceed the prediction from other initial states, which
+    /// are those `from` changed.
+    ///
+    /// A segment takes its other initial state if that leaves smaller residuals.
     fn offer(
         &mut self,
         map: &mut StepMap<'_>,
@@ -134,14 +145,16 @@ impl Estimate {
                 retract(&layout, &mut other[w][..width], &change);
             }
         }
-        // One that leaves more than the best so far is of no use.
+        // A replay with larger residuals than the best so far is of no use.
         let each = worse.iter().zip(&*left);
         let most: Vec<Option<f64>> = each.map(|(worse, left)| worse.then_some(*left)).collect();
         self.take_better(map, theta, (other, &most), left)
     }
 
-    /// Replays segments from other starts, each as far as it leaves no more than the `most` that is asked of it; where that is less than what is
-    /// `left` by now, the segment takes it.
+    /// Replays segments from other initial states, each until its residuals exceed its limit in
+    /// `most`.
+    ///
+    /// A segment takes its other replay if that leaves less than the residuals `left` so far.
     pub(super) fn take_better(
         &mut self,
         map: &mut StepMap<'_>,

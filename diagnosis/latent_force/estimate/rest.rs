@@ -1,24 +1,25 @@
-//! Joints that stand: what may hold them.
+//! Joints at rest: the forces that may hold them.
 
 use crate::latent_force::context::Context;
 
 use super::Estimate;
 
-/// Speed up to which a joint counts as at rest, in deviations of its estimate.
+/// Largest speed of a joint at rest, in standard deviations of its estimate.
 const REST_DEVIATIONS: f64 = 3.0;
-/// The same relative to its largest speed.
+/// The same relative to the joint's largest speed.
 const REST_SHARE: f64 = 0.02;
-/// Deviations of the sign test's count from which on more rows than not have a force against their motion, or along it: fewer than nine tell nothing.
+/// Standard deviations of the sign test's count from which the sign of a force against the motion
+/// is certain; with fewer than nine rows it never is.
 const SURE: f64 = 3.0;
 
 impl Estimate {
-    /// Speed of a degree of freedom in a row of a walk.
+    /// Returns the speed of a degree of freedom in a row of a walk.
     pub(super) fn speed(&self, context: &Context<'_>, walk: usize, row: usize, dof: usize) -> f64 {
         let layout = &context.plant().layout;
         self.trajectory[walk][row * (layout.nq + layout.nv) + layout.nq + dof]
     }
 
-    /// Speed up to which each degree of freedom counts as at rest.
+    /// Returns the speed below which each degree of freedom counts as at rest.
     #[must_use]
     pub fn rest_speeds(&self, context: &Context<'_>) -> Vec<f64> {
         let nv = context.plant().layout.nv;
@@ -36,8 +37,10 @@ impl Estimate {
             .collect()
     }
 
-    /// Dry friction that a joint shows where it moves faster than at rest: the median of the missing force against its motion where that is
-    /// certain, averaged over the directions. What always acts opposes only one of them.
+    /// Returns the dry friction that a joint shows where it moves faster than at rest.
+    ///
+    /// This is the median missing force against its motion where its sign is certain, averaged over
+    /// the directions. A force that always acts opposes only one of them.
     fn friction_shown(&self, context: &Context<'_>, dof: usize, rest: f64) -> f64 {
         let nv = context.plant().layout.nv;
         let mut against = [Vec::new(), Vec::new()];
@@ -57,8 +60,10 @@ impl Estimate {
         shown.iter().sum::<f64>().max(0.0) / shown.len().max(1) as f64
     }
 
-    /// Lets joints that stand be held by any force as large as the dry friction that moving rows show, in
-    /// every model alike: at rest friction is any force within its cone, and says nothing of its size.
+    /// Lets any force as large as the dry friction of the moving rows hold a joint at rest, in
+    /// every model alike.
+    ///
+    /// At rest, friction is any force within its cone, and carries no information about its size.
     pub fn free_at_rest(&mut self, context: &Context<'_>) {
         let layout = &context.plant().layout;
         let nv = layout.nv;
@@ -83,7 +88,8 @@ impl Estimate {
     }
 }
 
-/// The median of some values, or zero where the sign test leaves its sign open; `None` of so few that it always does.
+/// Returns the median of some values, or zero where the sign test leaves its sign open; `None` if
+/// there are too few for any sign to be certain.
 fn certain_median(values: &mut [f64]) -> Option<f64> {
     let positive = values.iter().filter(|x| **x > 0.0).count() as f64;
     let n = values.len() as f64;
@@ -107,7 +113,7 @@ mod tests {
         assert_eq!(certain_median(&mut []), None);
         assert_eq!(certain_median(&mut values(8)), None);
         assert_eq!(certain_median(&mut values(9)), Some(5.0));
-        // Of a hundred, 65 to 35 are certain and 64 to 36 are not.
+        // Of a hundred, 65 to 35 is certain and 64 to 36 is not.
         let signed = |positive: u32| -> Vec<f64> {
             let sign = |k| if k < positive { 1.0 } else { -1.0 };
             (0..100).map(sign).collect()

@@ -9,11 +9,11 @@ use super::Estimate;
 const LARGEST_CHANGE: f64 = 2.0;
 /// Largest correlation of a missing force over a row.
 const LARGEST_CORRELATION: f64 = 0.9999;
-/// Least deviation of a reading, relative to its noise as given or first estimated.
+/// Smallest standard deviation of a reading, relative to its given or first estimated noise.
 const LEAST_READING: f64 = 0.2;
-/// Most of it.
+/// Largest standard deviation of a reading, relative to the same noise.
 const MOST_READING: f64 = 2.0;
-/// Least deviation of a missing force, relative to the joint's inertial forces.
+/// Smallest standard deviation of a missing force, relative to the joint's inertial forces.
 const LEAST_FORCE: f64 = 1e-5;
 
 impl Estimate {
@@ -58,7 +58,8 @@ impl Estimate {
             if !rho.is_finite() {
                 continue;
             }
-            // What a row adds is well told by the readings; how large it grows in the long run is not.
+            // The readings determine the increment of a row well, but not how large the force
+            // becomes in the long run.
             let innovation = (later - 2.0 * rho * product + rho * rho * earlier) / sums.steps;
             let before = self.noise.q[j] * (1.0 - (-2.0 * dt / self.noise.tau[j]).exp());
             let least = (LEAST_FORCE * context.inertial[j]).powi(2);
