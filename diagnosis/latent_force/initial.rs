@@ -1,4 +1,4 @@
-//! A first trajectory from the readings, and what is known of where episodes begin.
+//! First trajectory from the readings, and priors of the initial states.
 
 use std::ops::Range;
 
@@ -15,20 +15,25 @@ use super::smoother::Start;
 use super::tangent::difference;
 use super::walk::Walk;
 
-/// Half the rows that a speed is taken over.
+/// Half the number of rows over which a speed is taken.
 const HALF_WINDOW: usize = 2;
-/// Deviation of a start that the log gives, relative to the largest value of its coordinate.
+/// Standard deviation of an initial state that the log gives, relative to the coordinate's largest
+/// value.
 const GIVEN: f64 = 1e-4;
-/// Deviation of a start that the log does not give, relative to the largest value of its coordinate.
+/// Standard deviation of an initial state that the log does not give, relative to the coordinate's
+/// largest value.
 const OPEN: f64 = 2.0;
 
-/// Deviation of where a segment begins, in deviations of the reading of its position.
+/// Standard deviation of a segment's initial position, in standard deviations of its reading.
 const READ: f64 = 5.0;
-/// Time over which that makes the deviation of its speed, s: half the window that a speed is taken over at 100 Hz, so that a bounce
-/// within it is allowed for.
+/// Time over which that gives the standard deviation of its speed, s.
+///
+/// It is half the window over which a speed is taken at 100 Hz, so that a bounce within the window
+/// is allowed for.
 const READ_TIME: f64 = 0.02;
 
-/// Fills missing values of a series linearly between their neighbours; false where there is none.
+/// Fills missing values of a series linearly between their neighbours; returns false if all are
+/// missing.
 fn fill(time: &[f64], values: &mut [f64]) -> bool {
     let present: Vec<usize> = (0..values.len())
         .filter(|&k| values[k].is_finite())
@@ -49,8 +54,9 @@ fn fill(time: &[f64], values: &mut [f64]) -> bool {
     true
 }
 
-/// Gives the quaternions of a series (its four components) the sign that is nearer to the one before: `q` and
-/// `-q` are the same orientation, but what lies between them is none.
+/// Gives each quaternion of a series (four components) the sign that is closer to the one before.
+///
+/// `q` and `-q` are the same orientation, but points between them are not orientations.
 fn align_signs(series: &mut [Vec<f64>]) {
     let rows = series.first().map_or(0, Vec::len);
     let mut before: Option<Vec<f64>> = None;
@@ -69,8 +75,10 @@ fn align_signs(series: &mut [Vec<f64>]) {
     }
 }
 
-/// Trajectories along some walks: `rows x (nq + nv)` each. What sensors of joints and of free bodies read is taken from
-/// them, speeds from differences where no sensor reads them, and the rest from `otherwise`.
+/// Returns trajectories along some walks, `rows x (nq + nv)` each.
+///
+/// Coordinates that sensors of joints and of free bodies read are taken from the readings. Speeds
+/// that no sensor reads are differences of positions. The rest comes from `otherwise`.
 #[must_use]
 pub fn from_readings(
     plant: &Plant,
@@ -103,7 +111,7 @@ pub fn from_readings(
     out
 }
 
-/// Some channels of the readings along a walk, one after the other.
+/// Returns some channels of the readings along a walk, one after the other.
 fn series(logs: &Logs, walk: &Walk, channels: Range<usize>) -> Vec<Vec<f64>> {
     let readings = &logs.episodes[walk.episode].readings;
     let channel = |c: usize| {
@@ -115,9 +123,9 @@ fn series(logs: &Logs, walk: &Walk, channels: Range<usize>) -> Vec<Vec<f64>> {
 
 /// Degrees of freedom that sensors of joints and of free bodies read.
 struct Read {
-    /// Whether its position is, `nv`.
+    /// Whether each position is read, `nv`.
     places: Vec<bool>,
-    /// Whether its speed is, `nv`.
+    /// Whether each speed is read, `nv`.
     speeds: Vec<bool>,
 }
 
@@ -129,7 +137,8 @@ impl Read {
         }
     }
 
-    /// Writes what a sensor has read into the states of a walk, if it reads a joint or a free body.
+    /// Writes the readings of a sensor into the states of a walk, if it reads a joint or a free
+    /// body.
     fn take(&mut self, plant: &Plant, sensor: usize, series: &[Vec<f64>], states: &mut [f64]) {
         let layout = &plant.layout;
         let rows = states.chunks_exact_mut(layout.nq + layout.nv).enumerate();
@@ -171,7 +180,7 @@ impl Read {
     }
 }
 
-/// Speeds from differences of positions, where no sensor reads them.
+/// Fills in speeds that no sensor reads, from differences of positions.
 fn speeds(plant: &Plant, walk: &Walk, read: &Read, states: &mut [f64]) {
     let layout = &plant.layout;
     let (nq, nv, n) = (layout.nq, layout.nv, walk.len());
@@ -192,7 +201,7 @@ fn speeds(plant: &Plant, walk: &Walk, read: &Read, states: &mut [f64]) {
     }
 }
 
-/// Angular speeds of free bodies from their orientations, about the body's own axes.
+/// Fills in the angular speeds of free bodies about their own axes, from their orientations.
 fn spin(plant: &Plant, walk: &Walk, read: &[bool], states: &mut [f64]) {
     let layout = &plant.layout;
     let width = layout.nq + layout.nv;
@@ -217,8 +226,8 @@ fn spin(plant: &Plant, walk: &Walk, read: &[bool], states: &mut [f64]) {
     }
 }
 
-/// Largest magnitude of each tangent coordinate along some trajectories: of positions their spread about the first
-/// row's.
+/// Returns the largest magnitude of each tangent coordinate along some trajectories; positions
+/// count relative to the first row.
 #[must_use]
 pub fn scales(plant: &Plant, trajectory: &[Vec<f64>]) -> Vec<f64> {
     let layout = &plant.layout;
@@ -239,7 +248,8 @@ pub fn scales(plant: &Plant, trajectory: &[Vec<f64>]) -> Vec<f64> {
     scale
 }
 
-/// Deviation of the reading of each position that a sensor reads directly, else 0; `nv`.
+/// Returns the noise (standard deviation) of each position that a sensor reads directly, else 0;
+/// `nv`.
 #[must_use]
 pub fn position_noise(plant: &Plant, logs: &Logs) -> Vec<f64> {
     let mut noise = vec![0.0; plant.layout.nv];
@@ -249,7 +259,7 @@ pub fn position_noise(plant: &Plant, logs: &Logs) -> Vec<f64> {
     noise
 }
 
-/// The entry of a reading that each position is read in directly, where there is one; `nv`.
+/// Returns the entry of a reading that reads each position directly, where there is one; `nv`.
 #[must_use]
 pub fn position_entries(plant: &Plant, logs: &Logs) -> Vec<Option<usize>> {
     let mut entries = vec![None; plant.layout.nv];
@@ -262,7 +272,7 @@ pub fn position_entries(plant: &Plant, logs: &Logs) -> Vec<Option<usize>> {
     entries
 }
 
-/// Degrees of freedom whose positions a sensor reads directly.
+/// Returns the degrees of freedom whose positions a sensor reads directly.
 fn positions_read(plant: &Plant, sensor: &str) -> Range<usize> {
     let layout = &plant.layout;
     let Some(index) = layout.sensors.iter().position(|s| s.name == sensor) else {
@@ -279,8 +289,10 @@ fn positions_read(plant: &Plant, sensor: &str) -> Range<usize> {
     }
 }
 
-/// Where a walk begins, as the filter wants it: about the log's own start where `given`, else about the
-/// trajectory's first state. `noise` is the deviation of the reading of each position that a sensor reads directly.
+/// Returns the prior of a walk's initial state: about the log's own initial state where `given`,
+/// else about the trajectory's first state.
+///
+/// `noise` is the standard deviation of the reading of each position that a sensor reads directly.
 #[must_use]
 pub fn start(
     plant: &Plant,
@@ -312,8 +324,12 @@ pub fn start(
     start
 }
 
-/// What the readings about a row leave open of a tangent coordinate there: positions by a few deviations of their reading,
-/// speeds by what that is over the window in which they are taken; where no sensor reads it, as large as the coordinate gets.
+/// Returns the uncertainty (standard deviation) of a tangent coordinate that the readings about a
+/// row leave.
+///
+/// For positions it is a few standard deviations of their reading. For speeds it is the same,
+/// divided by half the window over which they are taken. If no sensor reads the coordinate, it is
+/// twice the coordinate's largest value.
 #[must_use]
 pub fn open_by_reading(i: usize, (scale, noise): (&[f64], &[f64])) -> f64 {
     let nv = noise.len();
@@ -325,7 +341,8 @@ pub fn open_by_reading(i: usize, (scale, noise): (&[f64], &[f64])) -> f64 {
     }
 }
 
-/// Where a segment begins about its trajectory's first state: at its readings, as open as these leave it.
+/// Returns the prior of a segment's initial state: about its readings, as uncertain as these leave
+/// it.
 #[must_use]
 pub fn start_of_segment(
     plant: &Plant,

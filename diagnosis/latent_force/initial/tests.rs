@@ -6,7 +6,8 @@ use nalgebra::UnitQuaternion;
 
 use super::*;
 
-/// A slide whose place is read, one whose speed is read as well, one that no sensor reads, and a free body.
+/// A slide whose position is read, one whose speed is read too, one that no sensor reads, and a
+/// free body.
 const SCENE: &str = r#"<mujoco><option timestep="0.01"/><worldbody>
     <body><joint name="a" type="slide"/><geom size="0.1" mass="1"/></body>
     <body><joint name="b" type="slide"/><geom size="0.1" mass="1"/></body>
@@ -16,7 +17,7 @@ const SCENE: &str = r#"<mujoco><option timestep="0.01"/><worldbody>
     <jointpos name="a" joint="a"/><jointpos name="b" joint="b"/><jointvel name="vb" joint="b"/>
     <framepos name="at" objtype="body" objname="free"/></sensor></mujoco>"#;
 
-/// Numbers of a state, and where speeds begin.
+/// Width of a state, and index of its first speed.
 const WIDTH: usize = 19;
 const SPEEDS: usize = 10;
 /// Rows of a log, and time between them, s.
@@ -27,7 +28,8 @@ fn plant() -> Plant {
     Plant::of(&Scene::from_xml("scene", SCENE, &[]).unwrap()).unwrap()
 }
 
-/// First states of a log of some sensors, given by a function of sensor and row; what no sensor reads is 7.
+/// Returns the first states of a log of some sensors, from a function of sensor and row;
+/// coordinates that no sensor reads are 7.
 fn states(sensors: &[&str], reading: impl Fn(&str, usize) -> Vec<f64>) -> Vec<Vec<f64>> {
     let plant = plant();
     let names: Vec<String> = sensors.iter().map(|s| (*s).to_owned()).collect();
@@ -93,7 +95,7 @@ fn speeds_are_differences_of_places_where_no_sensor_reads_them() {
         assert_near(&state[..7], &[fall, t, 7.0, t, 2.0 * t, fall, 7.0], 1e-12);
         assert_near(&state[SPEEDS + 1..SPEEDS + 5], &[-4.0, 7.0, 1.0, 2.0], 1e-9);
         assert_near(&state[SPEEDS + 6..], &[7.0; 3], 1e-12);
-        // The speed in the middle of the rows that it is taken over.
+        // The speed in the middle of the rows over which it is taken.
         let (from, to) = (
             k.saturating_sub(HALF_WINDOW),
             (k + HALF_WINDOW).min(ROWS - 1),
@@ -133,7 +135,7 @@ fn the_spin_of_a_body_is_about_its_own_axes_whatever_the_signs_of_its_quaternion
 
 #[test]
 fn an_orientation_is_filled_across_a_change_of_sign() {
-    // Half way between q and -q, which are the same orientation, lies no orientation at all.
+    // The midpoint of q and -q, which are the same orientation, is not an orientation.
     let spin = Vector3::new(0.0, 0.0, 0.5);
     let found = states(&["turn"], |_, k| match k {
         0..4 => wxyz(turning(spin, k), 1.0),
@@ -141,7 +143,7 @@ fn an_orientation_is_filled_across_a_change_of_sign() {
         _ => wxyz(turning(spin, k), -1.0),
     });
     for (k, state) in found.iter().enumerate() {
-        // The chord's middle is the arc's.
+        // The middle of the chord is that of the arc.
         let turn = unit_quaternion(&state[6..10]).angle_to(&turning(spin, k));
         assert!(turn < 1e-7, "row {k}: {turn}");
         assert_near(&state[SPEEDS + 6..], spin.as_slice(), 1e-9);
@@ -160,7 +162,7 @@ fn scales_are_the_largest_moves_from_the_first_row_and_the_largest_speeds() {
     (rows[0][SPEEDS], rows[1][SPEEDS], rows[2][SPEEDS]) = (0.5, -3.0, 1.0);
     let scale = scales(&plant, &[rows.concat()]);
     assert_near(&[scale[0], scale[7], scale[9]], &[2.0, 0.2, 3.0], 1e-12);
-    // What does not move has a scale still.
+    // A coordinate that does not move still has a scale.
     assert!(scale.iter().all(|s| *s > 0.0));
 }
 
@@ -178,7 +180,7 @@ fn a_start_that_the_log_gives_beats_its_readings() {
     let scale: Vec<f64> = (1..=18).map(f64::from).collect();
     let mut noise = vec![0.0; 9];
     noise[2] = 1.0;
-    // The second slide's place is left open.
+    // The second slide's position is left open.
     let given = start(&plant, Some((&state, &[1])), &first, (&scale, &noise));
     assert_near(&given.mean[..2], &[-0.2, 0.0], 1e-12);
     assert_near(&given.mean[9..10], &[4.0], 1e-12);
@@ -187,7 +189,8 @@ fn a_start_that_the_log_gives_beats_its_readings() {
         assert!((deviation(&given, i) - GIVEN * scale[i]).abs() < 1e-12);
     }
     assert!((deviation(&given, 1) - OPEN * scale[1]).abs() < 1e-12);
-    // Without a start all is open, a place by no less than ten deviations of its readings.
+    // Without a given initial state all coordinates are open, a position by at least ten standard
+    // deviations of its readings.
     let open = start(&plant, None, &first, (&scale, &noise));
     assert_near(&open.mean, &[0.0; 18], 1e-12);
     for i in (0..18).filter(|i| *i != 2) {
