@@ -279,7 +279,7 @@ fn smooth(
     Ok(())
 }
 
-/// Moves an estimate to a model whose values differ by `changes`, one a column of a linearisation
+/// Moves an estimate to a model whose values differ by `changes`, one per column of a linearisation
 /// about the estimate.
 ///
 /// The initial states of segments move with the values, as they do in each step of a fit.

@@ -43,11 +43,11 @@ use filter::{Filter, Step};
 /// Covariances of the latent force and of the readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseModel {
-    /// Stationary variance of the missing force, one a degree of freedom.
+    /// Stationary variance of the missing force, one per degree of freedom.
     pub q: Vec<f64>,
-    /// Its correlation time, s, one a degree of freedom.
+    /// Its correlation time, s, one per degree of freedom.
     pub tau: Vec<f64>,
-    /// Variance of the white part of the missing force, independent from row to row; one a degree
+    /// Variance of the white part of the missing force, independent from row to row; one per degree
     /// of freedom.
     pub white: Vec<f64>,
     /// Variance of each entry of a reading.
@@ -148,7 +148,7 @@ impl Sums {
 /// A smoothed episode.
 #[derive(Clone, Debug, Default)]
 pub struct Smoothed {
-    /// Natural log-likelihood of its readings, up to a constant of `ln 2 pi` a reading.
+    /// Natural log-likelihood of its readings, up to a constant of `ln 2 pi` per reading.
     pub log_likelihood: f64,
     /// Change of the trajectory, `rows x nx`.
     pub change: Vec<f64>,

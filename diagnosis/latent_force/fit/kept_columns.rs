@@ -17,8 +17,8 @@ const KEPT: usize = 4;
 /// its prior's standard deviation: a nonlinear law bends over either.
 const KEPT_MOVE: f64 = 0.1;
 
-/// Columns of one walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns
-/// x m`.
+/// Columns of one walk: of the next states, `(rows - 1) x nx x m`, and of the readings,
+/// `rows x ns x m`.
 #[derive(Debug, Default)]
 struct Along {
     states: Vec<f64>,

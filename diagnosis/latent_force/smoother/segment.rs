@@ -19,8 +19,8 @@ struct Rows {
     entry: Vec<usize>,
     /// Residuals of the readings.
     left: DVector<f64>,
-    /// Derivatives with respect to the initial state, then directions of scatter, `readings x (nx +
-    /// directions)`.
+    /// Derivatives with respect to the initial state, then directions of scatter,
+    /// `readings x (nx + directions)`.
     start: DMatrix<f64>,
     /// Derivatives with respect to the columns' coefficients, `readings x m`.
     columns: DMatrix<f64>,

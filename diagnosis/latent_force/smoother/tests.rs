@@ -32,8 +32,9 @@ struct Case {
 }
 
 impl Case {
-    /// A random episode of `rows` unevenly spaced rows, `nv` degrees of freedom, `ns` entries a row and `m` columns. A
-    /// fifth of the readings is missing, and every third row has a free force.
+    /// A random episode of `rows` unevenly spaced rows, `nv` degrees of freedom, `ns` entries per
+    /// row and `m` columns. A fifth of the readings is missing, and every third row has a free
+    /// force.
     fn random(nv: usize, rows: usize, ns: usize, m: usize) -> Self {
         let mut rng = asid_core::Streams::new(7).stream(&format!("{nv}"));
         let nx = 2 * nv;
