@@ -21,7 +21,7 @@ use crate::optimise::{CemSettings, require};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherCem {
-    /// Refits of the search distribution.
+    /// Refits of the distribution.
     pub iterations: usize,
     /// Action sequences per refit.
     pub population: usize,

@@ -52,12 +52,12 @@ pub struct Articulation {
     pub axis: Option<[f64; 3]>,
     /// Standard deviation of the axis, rad.
     pub axis_std: Option<f64>,
-    /// Point of the axis nearest to the moving part, in the fixed part's frame, m; `None` unless
-    /// the joint is revolute.
+    /// Point of the axis nearest to the moving part, in the fixed part's frame, m; `None` but
+    /// for a revolute joint.
     pub origin: Option<[f64; 3]>,
     /// Standard deviation of the origin across the axis, m.
     pub origin_std: Option<f64>,
-    /// Travel of the joint: largest minus smallest angle (rad) or shift (m).
+    /// How far the joint moved: largest less smallest angle (rad) or shift (m).
     pub travel: f64,
     /// Root mean square of the whitened residual.
     pub residual: f64,

@@ -34,7 +34,7 @@ pub struct GaussNewtonSettings {
     /// Number of starts: the best of these points. Several are needed since contact creates local
     /// minima.
     pub starts: usize,
-    /// Maximum number of iterations from each start.
+    /// Most iterations from each start.
     pub iterations: usize,
     /// Initial half step of the differences, in prior standard deviations.
     pub step: f64,
