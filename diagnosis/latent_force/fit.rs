@@ -76,7 +76,7 @@ impl Hypothesis {
 pub struct Fitted {
     /// The model.
     pub hypothesis: Hypothesis,
-    /// All its values.
+    /// Values of all its unknowns.
     pub theta: Vec<f64>,
     /// Natural logarithm of its marginal likelihood.
     pub evidence: f64,

@@ -7,8 +7,8 @@
 //!
 //! Derivatives are forward differences. Each episode has one simulation for the unperturbed model
 //! and one for each perturbed coordinate of the state, force or value. An effect with memory (a
-//! delay, a rotor behind backlash) runs along with its own simulation, so its memory at a row is
-//! that of the trajectory before the row.
+//! delay, a rotor behind backlash) runs along with its own simulation. Its memory at a row is that
+//! of the trajectory before the row.
 
 mod carried;
 mod late;

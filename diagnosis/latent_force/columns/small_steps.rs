@@ -1,8 +1,8 @@
 //! Steps of derivatives along whole replays, reduced until the changes that they cause are small
 //! beside the motion.
 //!
-//! A fixed fraction of a catalogue's range does not suit every machine. 30 N s/m stop a cart of 1
-//! kg at once, and the change of its log is then no derivative. The size of the change of the
+//! A fixed fraction of a catalogue's range does not suit every machine. 30 N s/m stop a cart of
+//! 1 kg at once, and the change of its log is then no derivative. The size of the change of the
 //! readings shows this.
 
 use asid_core::Result;

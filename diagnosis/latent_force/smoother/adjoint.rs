@@ -1,7 +1,7 @@
 //! The backward pass: the adjoint recursion of Bryson and Frazier, from the last row to the first.
 //!
-//! With `P` and `m` of the forward pass, the smoothed state is `m - P lambda` and its covariance `P
-//! - P Lambda P`. The adjoint variables `lambda` and `Lambda` absorb each reading and are
+//! With `P` and `m` of the forward pass, the smoothed state is `m - P lambda` and its covariance
+//! `P - P Lambda P`. The adjoint variables `lambda` and `Lambda` absorb each reading and are
 //! propagated back through each transition (Bierman 1977).
 //!
 //! States are smoothed from the filtered state *after* the row's readings. From the predicted
