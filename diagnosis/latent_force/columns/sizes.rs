@@ -16,8 +16,8 @@ const TRIAL: f64 = 1e-5;
 /// Multiple of the segments' residuals that one standard deviation of a prior causes at fixed
 /// initial states.
 ///
-/// An acceleration changes the readings 5 times as much as it does once the initial state is fitted
-/// to it, and only a few segments may show an effect.
+/// At fixed initial states, an acceleration changes the readings 5 times as much as once the
+/// initial states are fitted to it. And only a few segments may show an effect.
 const REPLAY_MULTIPLE: f64 = 10.0;
 /// Step of derivatives along replays, relative to a parameter's range: over a smaller step, contact
 /// points that appear and vanish hide the derivative.
@@ -282,10 +282,11 @@ fn sizes_by_replay(
     squares.into_iter().map(size).collect()
 }
 
-/// Returns priors' standard deviations from the change of speeds from row to row per unit of each
-/// parameter, along those of some walks that are not segments.
+/// Returns priors' standard deviations from the change of speeds per row and per unit of each
+/// parameter, along some walks.
 ///
-/// The reference is the missing change of speed there. Infinite where a parameter has no effect.
+/// Segments are left out. The reference is the missing change of speed there. Infinite where a
+/// parameter has no effect.
 fn sizes_along_rows(
     (context, estimate): (&Context<'_>, &Estimate),
     linear: &[LinearEpisode],

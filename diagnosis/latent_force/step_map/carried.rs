@@ -1,9 +1,9 @@
 //! Derivatives over a row, extended from one of its physics steps to all of them.
 //!
-//! With `a` the derivative of a step with respect to the state and `b` that with respect to a value
-//! of the model, those of `n` steps are `a^n` and `(I + a + … + a^(n-1)) b`. They are right to
-//! second order in the row's duration, because they are taken in its middle. The result of a fit
-//! hardly depends on them, only its speed does.
+//! Let `a` be the derivative of a step with respect to the state, and `b` that with respect to a
+//! value of the model. The derivatives of `n` steps are `a^n` and `(I + a + … + a^(n-1)) b`. They
+//! are right to second order in the row's duration, because they are taken in its middle. The
+//! result of a fit hardly depends on them, only its speed does.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -2,8 +2,10 @@
 
 use super::LinearEpisode;
 
-/// Returns the delay of an entry's reading in row `k`, s, from its response to a ramp of a
-/// position, or of a speed if it reads no position.
+/// Returns the delay of an entry's reading in row `k`, s.
+///
+/// It follows from the response to a ramp of a position, or of a speed if the entry reads no
+/// position.
 fn lag(h: &[f64], ramp: &[f64], time: f64) -> f64 {
     let (place, speed) = h.split_at(h.len() / 2);
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();

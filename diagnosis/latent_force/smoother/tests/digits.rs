@@ -50,9 +50,10 @@ fn a_wide_start_costs_the_logarithm_of_its_width_however_fine_the_readings() {
 
 #[test]
 fn a_wide_start_leaves_the_sums_of_fine_readings_right() {
-    // A difference of numbers 1e12 times as large, as in correcting the first state from before its
-    // readings, makes the squared residuals a thousand times too large with an initial state within
-    // 5 m. The readings' variance then runs into its bound.
+    // The smoothed first state has to follow from the filtered state after its readings. From the
+    // state before them it is a difference of numbers 1e12 times as large. With an initial state
+    // within 5 m, squared residuals are then a thousand times too large, and their variance runs
+    // into its bound.
     for width in [25.0, 36.0, 100.0, 1e4] {
         let mut case = finely_read(width);
         let speeds = case.linear.residual.iter_mut().skip(1).step_by(2);
