@@ -13,22 +13,22 @@ use crate::simulator::LoadedSimulator;
 use crate::table;
 
 impl Engine {
-    /// The engine as a backend under a name of the host's choice, which differs
-    /// from its own where that is taken.
+    /// The engine as a backend under a name that the host chooses; it differs from the engine's own
+    /// if that is taken.
     #[must_use]
     pub fn backend(&self, name: &str) -> Box<dyn Backend> {
         Box::new(LoadedBackend::new(self.clone(), name))
     }
 }
 
-/// An engine of a plugin under the name that it is registered by.
+/// An engine of a plugin under its registered name.
 pub struct LoadedBackend {
     engine: Engine,
     name: String,
 }
 
 impl LoadedBackend {
-    /// The engine under a name.
+    /// Wraps the engine under a name.
     #[must_use]
     pub fn new(engine: Engine, name: &str) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl Model for LoadedModel {
         let mut error = table::Error::empty();
         let model = self.handle.pointer();
         let code = engine.action("nominal").run(|| {
-            // SAFETY: all that is pointed to lives until the call returns.
+            // SAFETY: everything pointed to lives until the call returns.
             unsafe { nominal(model, &named.table(), &mut value, &mut error) }
         });
         let about = about(code, engine, &target.to_string());

@@ -1,5 +1,4 @@
-//! An engine's batch: its handle, calls of the table on it, and what the engine
-//! says of its simulations.
+//! An engine's batch: its handle, calls of the table on it, and the status of its simulations.
 
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -12,14 +11,14 @@ use crate::handle::{ModelHandle, NamedTarget, about, function};
 use crate::table::{self, Code};
 use crate::text;
 
-/// An engine's handle of a batch; destroyed with the value.
+/// An engine's handle of a batch, which is destroyed with the value.
 pub struct BatchHandle {
-    /// The scene that it is of.
+    /// The scene of the batch.
     pub model: Arc<ModelHandle>,
     pointer: NonNull<table::Batch>,
-    /// What each column sets.
+    /// The target of each column.
     pub columns: Vec<String>,
-    /// What the engine said when it panicked.
+    /// The engine's message when it panicked.
     poison: Option<String>,
 }
 
@@ -28,7 +27,7 @@ unsafe impl Send for BatchHandle {}
 
 impl Drop for BatchHandle {
     fn drop(&mut self) {
-        // A batch that panicked may be in any state; its memory is left alone.
+        // A batch that panicked may be in any state, so its memory is not freed.
         if self.poison.is_none()
             && let Some(destroy) = self.model.engine.table.destroy_batch
         {
@@ -71,7 +70,7 @@ impl BatchHandle {
         let mut pointer = std::ptr::null_mut();
         let mut error = table::Error::empty();
         let code = engine.action("make_batch").run(|| {
-            // SAFETY: all that is pointed to lives until the call returns.
+            // SAFETY: everything pointed to lives until the call returns.
             unsafe { make(model.pointer(), &settings, &mut pointer, &mut error) }
         });
         let asked = match code {
@@ -103,7 +102,7 @@ impl BatchHandle {
     /// Calls a function of the table with this batch, unless the batch is poisoned.
     ///
     /// # Errors
-    /// The engine's own, and that it panicked before.
+    /// The engine's own, or that the batch panicked before.
     pub fn call<F>(
         &mut self,
         name: &str,
@@ -136,10 +135,10 @@ impl BatchHandle {
         decode(code, &error, name, &subject, path)
     }
 
-    /// Asks for the statuses of all simulations where some have diverged, or had.
+    /// Updates the statuses of all simulations, if some are or were diverged.
     ///
     /// # Errors
-    /// Where the engine has no such functions.
+    /// When the engine lacks the functions for it.
     pub fn refresh(&self, all: &mut [Status]) -> Result<()> {
         let pointer = self.pointer.as_ptr();
         let count = function(
@@ -179,7 +178,7 @@ impl BatchHandle {
         Ok(())
     }
 
-    /// Physics steps of all simulations; 0 of a batch that panicked.
+    /// Physics steps of all simulations; 0 for a batch that panicked.
     pub fn steps_taken(&self) -> u64 {
         match self.engine().table.steps_taken {
             Some(count) if self.poison.is_none() => {
@@ -192,7 +191,7 @@ impl BatchHandle {
         }
     }
 
-    /// Sees to it that the engine claims what a call needs.
+    /// Checks that the engine claims the capabilities that a call needs.
     ///
     /// # Errors
     /// [`Error::Incapable`], naming what it cannot do and the file.
@@ -216,7 +215,7 @@ impl BatchHandle {
     }
 }
 
-/// Statuses asked for at a time.
+/// Number of statuses requested at a time.
 const STATUS_CHUNK: usize = 64;
 
 const RUNNING: table::Status = table::Status {

@@ -1,38 +1,37 @@
-//! A last word where a plugin crashes.
+//! A last message when a plugin crashes.
 //!
-//! A library can do what no check from outside prevents: write to an address that
-//! is not its own, or be cut short on the disk under a header that promises more.
-//! The system then ends the process without a word about why. While a plugin is
-//! opened or called, a note of what is being done lies ready, and a handler of the
-//! fatal signals writes it before the process ends with status 1.
+//! A library can fail in ways that no outside check prevents: it may write to a foreign address, or
+//! the file may be truncated behind a header that promises more. The system then ends the process
+//! without an explanation. While a plugin is opened or called, a note of the current action is
+//! therefore ready. A handler of the fatal signals writes it before the process ends with status 1.
 //!
-//! The handler does only what a signal handler may: it reads an atomic pointer,
-//! writes bytes and leaves.
+//! The handler does only what a signal handler may do: it reads an atomic pointer, writes bytes and
+//! exits.
 
 use std::path::Path;
 use std::ptr::null_mut;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicPtr, Ordering};
 
-/// A line to write, whole.
+/// A complete line to write.
 struct Note {
     line: String,
 }
 
-/// What is being done with a plugin now; the latest where several threads call.
+/// The current action on a plugin; the latest one if several threads call.
 static NOTE: AtomicPtr<Note> = AtomicPtr::new(null_mut());
 
-/// Notes are made once for each plugin and action, and kept.
+/// Notes are made once for each plugin and action, and never freed.
 static NOTES: Mutex<Vec<&'static Note>> = Mutex::new(Vec::new());
 
-/// What may be done with a plugin, ready to be noted.
+/// An action on a plugin, with its prepared note.
 #[derive(Clone, Copy)]
 pub struct Action {
     note: &'static Note,
 }
 
 impl Action {
-    /// Prepares the note of an action, such as `rollout`, on the plugin of a file.
+    /// Prepares the note of an action, such as `rollout`, on a plugin's file.
     pub fn new(path: &Path, what: &str) -> Self {
         let line = format!(
             "asid: plugin {}: {what}: crashed, and this program with it\n",
@@ -48,7 +47,7 @@ impl Action {
         Self { note }
     }
 
-    /// Does it, with the note lying ready.
+    /// Runs the action while its note is active.
     pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
         let before = NOTE.swap(std::ptr::from_ref(self.note).cast_mut(), Ordering::Relaxed);
         let _restored = Restored(before);
@@ -56,7 +55,7 @@ impl Action {
     }
 }
 
-/// Puts the note of an outer action back, also where a panic passes.
+/// Restores the note of an outer action, also on a panic.
 struct Restored(*mut Note);
 
 impl Drop for Restored {
@@ -65,7 +64,7 @@ impl Drop for Restored {
     }
 }
 
-/// Installs the handler, once a process.
+/// Installs the handler, once per process.
 #[cfg(all(unix, not(miri)))]
 pub fn watch() {
     use std::sync::Once;
@@ -83,15 +82,15 @@ pub fn watch() {
     });
 }
 
-/// Signals are those of Unix; elsewhere a crash has no last word.
+/// Only Unix has these signals; elsewhere a crash leaves no message.
 #[cfg(not(all(unix, not(miri))))]
 pub fn watch() {}
 
 #[cfg(all(unix, not(miri)))]
 fn install(signal: libc::c_int) {
-    // SAFETY: a zeroed `sigaction` is a valid one, both structures live through the
-    // calls, and the handler does nothing that is forbidden to one. The standard
-    // library's own handler of stack overflows is kept as `before`.
+    // SAFETY: a zeroed `sigaction` is a valid one, both structures live through the calls, and the
+    // handler does nothing that is forbidden to one. The standard library's own handler of stack
+    // overflows is kept as `before`.
     unsafe {
         let mut before: libc::sigaction = std::mem::zeroed();
         libc::sigaction(signal, std::ptr::null(), &mut before);
@@ -106,7 +105,7 @@ fn install(signal: libc::c_int) {
     }
 }
 
-/// What handled the signals before.
+/// The previous handlers of the signals.
 #[cfg(all(unix, not(miri)))]
 static BEFORE: Mutex<Vec<(libc::c_int, libc::sigaction)>> = Mutex::new(Vec::new());
 
@@ -115,14 +114,14 @@ extern "C" fn handle(signal: libc::c_int, _: *mut libc::siginfo_t, _: *mut libc:
     let note = NOTE.load(Ordering::Relaxed);
     // SAFETY: a note is never freed.
     if let Some(note) = unsafe { note.as_ref() } {
-        // SAFETY: `write` and `_exit` may be called in a handler of signals.
+        // SAFETY: `write` and `_exit` may be called in a signal handler.
         unsafe {
             libc::write(2, note.line.as_ptr().cast(), note.line.len());
             libc::_exit(1);
         }
     }
-    // No plugin is at work: whoever handled the signal before gets it when the
-    // instruction is tried again, and an abort is sent again.
+    // No plugin is active. The previous handler gets the signal when the instruction is retried; an
+    // abort is raised again.
     let before = BEFORE.try_lock().ok();
     let before = before.and_then(|all| {
         let of_signal = all.iter().find(|(s, _)| *s == signal);

@@ -1,4 +1,4 @@
-//! A table that has been checked: the engine of a plugin, before any scene.
+//! A checked table: the engine of a plugin, before any scene is loaded.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::library::Library;
 use crate::table::{self, ABI_MAJOR, ABI_MINOR, ENTRY};
 use crate::text;
 
-/// Bytes of the table's head: the versions and the size.
+/// Bytes of the table's head, which holds the versions and the size.
 const HEAD: usize = 16;
 
 /// Longest name of an engine.
@@ -22,9 +22,9 @@ pub struct Engine {
     inner: Arc<Checked>,
 }
 
-/// A checked table and where it came from.
+/// A checked table and its origin.
 pub struct Checked {
-    /// The host's own copy: functions that the plugin does not know are absent.
+    /// The host's own copy; functions that the plugin does not know are absent.
     pub table: table::Backend,
     /// File of the plugin, for messages.
     pub path: PathBuf,
@@ -32,12 +32,12 @@ pub struct Checked {
     version: String,
     about: String,
     capabilities: Capabilities,
-    /// What is noted while a function is called, by its name.
+    /// Crash notes for calls of a function, by its name.
     actions: Vec<(&'static str, Action)>,
 }
 
 impl Checked {
-    /// The note of a call of a function of the table.
+    /// The crash note for calls of a function of the table.
     #[must_use]
     pub fn action(&self, name: &str) -> Action {
         let known = self.actions.iter().find(|(n, _)| *n == name);
@@ -45,7 +45,7 @@ impl Checked {
     }
 }
 
-/// Functions that are called again and again.
+/// Functions that are called frequently.
 const OFTEN: [&str; 12] = [
     "rollout",
     "read",
@@ -71,7 +71,7 @@ impl std::fmt::Debug for Engine {
 /// Loads the engine of a library; `None` where the library exports none.
 ///
 /// # Errors
-/// [`Error::Plugin`] where the table is not one that this host can use.
+/// [`Error::Plugin`] when this host cannot use the table.
 pub fn engine(library: &'static Library, path: &Path) -> Result<Option<Engine>> {
     // SAFETY: the type is what the header says of this symbol.
     let Ok(entry) = (unsafe { library.get::<table::EntryFn>(ENTRY) }) else {
@@ -86,15 +86,15 @@ pub fn engine(library: &'static Library, path: &Path) -> Result<Option<Engine>> 
 }
 
 impl Engine {
-    /// Checks a table. `path` is what messages name.
+    /// Checks a table; messages name `path`.
     ///
     /// # Errors
-    /// [`Error::Plugin`] for a table of another major version, one that is cut
-    /// short, lacks a function, or has an empty name.
+    /// [`Error::Plugin`] for a table of another major version, one that is truncated, lacks a
+    /// function, or has an empty name.
     ///
     /// # Safety
-    /// `table` is null, or points to a table that stays valid and does what the
-    /// header says; of one with another major version, the two version numbers.
+    /// `table` is null, or points to a table that stays valid and does what the header says. For
+    /// another major version, the two version numbers suffice.
     pub unsafe fn from_table(table: *const table::Backend, path: &Path) -> Result<Self> {
         let refuse = |message: String| Error::Plugin {
             path: path.to_path_buf(),
@@ -115,7 +115,7 @@ impl Engine {
         // SAFETY: a table of this major version has its size there.
         let size = unsafe { (*table).size };
         let size = usize::try_from(size).unwrap_or(usize::MAX);
-        // Nothing has been added since minor version 0.
+        // Minor version 0 already had all fields.
         let needed = size_of::<table::Backend>();
         if size < needed {
             return Err(refuse(format!(
@@ -175,13 +175,13 @@ impl Engine {
         &self.inner.version
     }
 
-    /// One line for `asid list`.
+    /// One-line description for `asid list`.
     #[must_use]
     pub fn about(&self) -> &str {
         &self.inner.about
     }
 
-    /// What it claims.
+    /// Capabilities that it claims.
     #[must_use]
     pub fn capabilities(&self) -> Capabilities {
         self.inner.capabilities
@@ -204,7 +204,7 @@ fn is_name(name: &str) -> bool {
     !name.is_empty() && name.len() <= LONGEST_NAME && name.chars().all(allowed)
 }
 
-/// The first function that an engine with these capabilities must have and lacks.
+/// The first missing function that an engine with these capabilities must have.
 fn missing_function(t: &table::Backend) -> Option<&'static str> {
     let snapshots = t.capabilities & Capabilities::EXACT_SNAPSHOT.bits() != 0;
     [

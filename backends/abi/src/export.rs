@@ -1,9 +1,9 @@
-//! The other direction: a Rust [`Backend`] as a table, and so as a plugin.
+//! The other direction: turns a Rust [`Backend`] into a table, and so into a plugin.
 //!
-//! [`export_backend!`](crate::export_backend) in a `cdylib` crate is all that a
-//! plugin needs. What the table hands out are numbers and not addresses: a handle
-//! that was destroyed, or was never given, is not found, and the call says so. A
-//! panic ends at the table as an error, and the handle is of no use from then on.
+//! [`export_backend!`](crate::export_backend) in a `cdylib` crate is all that a plugin needs. The
+//! handles of the table are numbers, not addresses. A handle that was destroyed or never created is
+//! not found, and the call says so. A panic ends at the table as an error and invalidates the
+//! handle.
 
 mod batch;
 mod handles;
@@ -19,7 +19,7 @@ use crate::failure::encode;
 use crate::table::{self, ABI_MAJOR, ABI_MINOR, Code};
 use crate::text;
 
-/// Where a table finds its engine; [`export_backend!`](crate::export_backend) implements it.
+/// Gives a table its engine; [`export_backend!`](crate::export_backend) implements it.
 pub trait Export {
     /// The engine, made once.
     ///
@@ -61,7 +61,7 @@ macro_rules! export_backend {
         }
 
         /// The table of this engine: see `asid_backend.h`.
-        // SAFETY: the name is that of the ABI and belongs to it.
+        // SAFETY: the name is defined by the ABI and reserved for it.
         #[unsafe(no_mangle)]
         pub extern "C" fn asid_backend_entry() -> *const $crate::table::Backend {
             static TABLE: ::std::sync::OnceLock<$crate::table::Backend> =
@@ -72,10 +72,10 @@ macro_rules! export_backend {
     };
 }
 
-/// The table of an engine. What it points to is leaked; made once a library.
+/// The table of an engine. It is made once per library, and what it points to is leaked.
 ///
-/// An engine that cannot be made has a table all the same: its name is that of
-/// the package, and loading a scene says why.
+/// An engine that cannot be made has a table too: its name is that of the package, and loading a
+/// scene reports the reason.
 #[must_use]
 pub fn table<E: Export>(about: &str) -> table::Backend {
     let (name, version, capabilities) = match E::backend() {
@@ -120,16 +120,16 @@ unsafe extern "C" fn no_extension(_name: *const c_char) -> *const c_void {
     std::ptr::null()
 }
 
-/// Keeps panics of this library off the console: they reach the host as errors.
-/// `RUST_BACKTRACE` brings them back.
+/// Keeps panics of this library off the console, since they reach the host as errors.
+/// `RUST_BACKTRACE` restores the messages.
 pub fn keep_panics_quiet() {
     if std::env::var_os("RUST_BACKTRACE").is_none() {
         std::panic::set_hook(Box::new(|_| {}));
     }
 }
 
-/// Runs the body of a table's function: an error becomes its code and its words,
-/// a panic [`table::PANIC`].
+/// Runs the body of a table's function. An error becomes its code and message, a panic
+/// [`table::PANIC`].
 ///
 /// # Safety
 /// `error` is null or points to a structure that nobody else uses.

@@ -8,7 +8,7 @@ use crate::table::{self, Code};
 use crate::text;
 
 impl table::Error {
-    /// An error that says nothing yet.
+    /// An error without content.
     #[must_use]
     pub fn empty() -> Self {
         Self {
@@ -18,7 +18,7 @@ impl table::Error {
     }
 }
 
-/// Writes an error for the other side and gives its code.
+/// Writes an error for the other side and returns its code.
 pub fn encode(error: &Error, into: &mut table::Error) -> Code {
     let (code, subject, message) = match error {
         Error::Scene { scene, message } => (table::SCENE, scene.as_str(), message.clone()),
@@ -37,11 +37,13 @@ pub fn encode(error: &Error, into: &mut table::Error) -> Code {
     code
 }
 
-/// What a call of the plugin in `path` came to: `call` is its name in the table,
-/// `subject` what it was about where the plugin does not say.
+/// Turns the code of a call into a result.
+///
+/// `path` is the plugin's file and `call` the function's name in the table. `subject` is what the
+/// call was about, where the plugin does not say.
 ///
 /// # Errors
-/// The plugin's own error, in the kind that its code says, naming the file.
+/// The plugin's own error, of the kind given by its code, naming the file.
 pub fn decode(
     code: Code,
     error: &table::Error,
@@ -92,7 +94,7 @@ pub fn decode(
     })
 }
 
-/// An error of the plugin as such, in a call.
+/// An error caused by the plugin itself, in a call.
 #[must_use]
 pub fn broken(path: &Path, call: &str, what: &str) -> Error {
     Error::Plugin {

@@ -1,4 +1,4 @@
-//! Handles of compiled scenes, and what calls with them have in common.
+//! Handles of compiled scenes, and the common parts of calls with them.
 
 use std::cell::OnceCell;
 use std::ffi::{CString, c_char};
@@ -14,8 +14,8 @@ use crate::text;
 use crate::world::World;
 use crate::{layout, table::NONE};
 
-/// What the `world` function of a scene finds behind its pointer: the structure
-/// of the header comes first, and what the host needs follows.
+/// The object behind the pointer of a scene's `world` function. The header's structure comes first;
+/// the host's own data follow.
 #[repr(C)]
 struct HostScene<'a> {
     table: table::Scene,
@@ -23,13 +23,13 @@ struct HostScene<'a> {
     world: OnceCell<Result<World>>,
 }
 
-/// `asid_scene.world`: the host's reading of the document, made when it is first asked for.
+/// `asid_scene.world`: the host's reading of the document, made at the first request.
 unsafe extern "C" fn world(
     scene: *const table::Scene,
     error: *mut table::Error,
 ) -> *const table::World {
-    // SAFETY: the engine passes the scene that it was given, which is the first
-    // field of a `HostScene`; one thread uses it while `load` runs.
+    // SAFETY: the engine passes the scene that it was given, which is the first field of a
+    // `HostScene`; one thread uses it while `load` runs.
     let host = unsafe { &*scene.cast::<HostScene<'_>>() };
     let read = || {
         std::panic::catch_unwind(|| World::read(host.scene)).unwrap_or_else(|_| {
@@ -49,13 +49,13 @@ unsafe extern "C" fn world(
     }
 }
 
-/// An engine's handle of a compiled scene; destroyed when nobody uses it any more.
+/// An engine's handle of a compiled scene, destroyed when its last user is dropped.
 pub struct ModelHandle {
     /// The engine.
     pub engine: Arc<Checked>,
     pointer: NonNull<table::Model>,
     layout: Layout,
-    /// The host's reading, where the engine asked for it.
+    /// The host's reading, if the engine requested it.
     world: Option<World>,
 }
 
@@ -68,8 +68,8 @@ impl Drop for ModelHandle {
     fn drop(&mut self) {
         if let Some(destroy) = self.engine.table.destroy_model {
             self.engine.action("destroy_model").run(|| {
-                // SAFETY: made by `load`, and destroyed here only; batches and
-                // snapshots hold this handle, so none is left.
+                // SAFETY: made by `load`, and destroyed here only; batches and snapshots hold this
+                // handle, so none is left.
                 unsafe { destroy(self.pointer.as_ptr()) }
             });
         }
@@ -77,7 +77,7 @@ impl Drop for ModelHandle {
 }
 
 impl ModelHandle {
-    /// Names and places.
+    /// Names and indices.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -89,10 +89,10 @@ impl ModelHandle {
 }
 
 impl ModelHandle {
-    /// Has the engine compile a scene.
+    /// Lets the engine compile a scene.
     ///
     /// # Errors
-    /// Those of the engine, and where it breaks the contract.
+    /// Those of the engine, and when it breaks the contract.
     pub fn load(engine: Arc<Checked>, scene: &Scene) -> Result<Self> {
         let name = text::owned(scene.name());
         let xml = text::owned(scene.xml());
@@ -114,14 +114,14 @@ impl ModelHandle {
         let mut pointer = std::ptr::null_mut();
         let mut error = table::Error::empty();
         let code = engine.action("load").run(|| {
-            // SAFETY: all that is pointed to lives until the call returns.
+            // SAFETY: everything pointed to lives until the call returns.
             unsafe { load((&raw const host).cast(), &mut pointer, &mut error) }
         });
         let about = about(code, &engine, scene.name());
         decode(code, &error, "load", &about, &engine.path)?;
         let pointer = NonNull::new(pointer)
             .ok_or_else(|| broken(&engine.path, "load", "says that all is well and gives NULL"))?;
-        // From here on the model is destroyed whatever happens.
+        // From here on the handle destroys the model on every path.
         let mut handle = Self {
             engine: engine.clone(),
             pointer,
@@ -143,7 +143,7 @@ impl ModelHandle {
         Ok(handle)
     }
 
-    /// The layout that the engine gives, where it gives one.
+    /// The engine's own layout, if it provides one.
     fn own_layout(&self) -> Result<Option<Layout>> {
         let Some(get) = self.engine.table.layout else {
             return Ok(None);
@@ -170,7 +170,7 @@ pub struct NamedTarget {
 }
 
 impl NamedTarget {
-    /// Names of a target; its element's index where the engine uses the host's reading.
+    /// The names of a target, with its element's index if the engine uses the host's reading.
     pub fn new(target: &Target, model: &ModelHandle) -> Self {
         let object = model
             .world
@@ -184,7 +184,7 @@ impl NamedTarget {
         }
     }
 
-    /// The structure; what it points to lives as long as `self`.
+    /// The structure; its pointers are valid as long as `self` lives.
     pub fn table(&self) -> table::Target {
         let [element, name, attribute]: [*const c_char; 3] =
             std::array::from_fn(|i| self.names[i].as_ptr());
@@ -198,13 +198,13 @@ impl NamedTarget {
     }
 }
 
-/// A function of the table; one that an engine may leave out is an error to call.
+/// A function of the table; calling one that the engine omits is an error.
 pub fn function<F>(function: Option<F>, name: &str, engine: &Checked) -> Result<F> {
     function.ok_or_else(|| broken(&engine.path, name, "the engine has no such function"))
 }
 
-/// What an error is about where the engine does not say: itself where it cannot do
-/// something, else what it was asked for.
+/// The subject of an error where the engine does not name it: the engine if it is incapable, else
+/// `asked`.
 pub fn about(code: Code, engine: &Checked, asked: &str) -> String {
     if code != table::INCAPABLE {
         return asked.to_owned();

@@ -1,7 +1,7 @@
 //! The host's step hook as a C function.
 //!
-//! A panic in a hook must not unwind through the engine: it is kept, the hook
-//! does nothing more, and the panic goes on once the rollout has returned.
+//! A panic in a hook must not unwind through the engine. It is stored, the hook does nothing more,
+//! and the panic continues after the rollout has returned.
 
 use std::any::Any;
 use std::ffi::c_void;
@@ -13,7 +13,7 @@ use asid_core::simulator::{StepHook, StepView};
 
 use crate::table;
 
-/// A hook and the lengths of what it sees.
+/// A hook and the lengths of the arrays that it sees.
 pub struct HostHook<'a> {
     hook: &'a dyn StepHook,
     lengths: [usize; 3],
@@ -32,12 +32,12 @@ impl<'a> HostHook<'a> {
         }
     }
 
-    /// The context to pass beside [`call`].
+    /// The context to pass together with [`call`].
     pub fn context(&self) -> *mut c_void {
         std::ptr::from_ref(self).cast_mut().cast()
     }
 
-    /// Goes on with the panic of a hook, if there was one.
+    /// Resumes the panic of a hook, if there was one.
     pub fn finish(self) {
         let panic = self.panic.into_inner().unwrap_or_else(|e| e.into_inner());
         if let Some(panic) = panic {
@@ -60,8 +60,8 @@ pub unsafe extern "C" fn call(
         return;
     }
     let [nq, nv, nu] = host.lengths;
-    // SAFETY: the engine gives arrays of these lengths for the time of the call;
-    // an empty one may be null.
+    // SAFETY: the engine gives arrays of these lengths for the duration of the call; an empty one
+    // may be null.
     let mut seen = unsafe {
         let view = &*view;
         let slice = |p: *const f64, n: usize| match n {

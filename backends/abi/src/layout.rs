@@ -1,4 +1,4 @@
-//! Names and places across the ABI.
+//! Names and indices across the ABI.
 
 use std::ffi::{CString, c_char};
 
@@ -9,7 +9,7 @@ use crate::slices::read;
 use crate::table::{self, joint_kind};
 use crate::text;
 
-/// Reads an engine's layout, and checks it as far as it can be checked by itself.
+/// Reads an engine's layout and checks its consistency.
 ///
 /// # Errors
 /// What is missing or does not fit.
@@ -82,7 +82,7 @@ pub unsafe fn decode(layout: *const table::Layout) -> Result<Layout> {
     })
 }
 
-/// The joints, and how many positions and velocities they have.
+/// The joints, and the total numbers of their positions and velocities.
 ///
 /// # Safety
 /// As for [`decode`].
@@ -113,7 +113,7 @@ unsafe fn decode_joints(layout: &table::Layout) -> Result<(Vec<Joint>, [usize; 2
     Ok((joints, [nq, nv]))
 }
 
-/// The sensors, one after the other.
+/// The sensors, in order.
 ///
 /// # Safety
 /// As for [`decode`].
@@ -147,10 +147,10 @@ unsafe fn decode_sensors(layout: &table::Layout) -> Result<Vec<Sensor>> {
     Ok(sensors)
 }
 
-/// A layout as the other side reads it; owns all that the structure points to.
+/// A layout in the form for the other side; owns everything that the structure points to.
 pub struct LayoutTable {
     table: table::Layout,
-    // What `table` points to; vectors and strings keep their place on the heap.
+    // The targets of `table`'s pointers; vectors and strings keep their place on the heap.
     _names: Vec<CString>,
     _lists: [Vec<*const c_char>; 2],
     _joints: Vec<table::LayoutJoint>,
@@ -160,8 +160,8 @@ pub struct LayoutTable {
     _numbers: Vec<Vec<f64>>,
 }
 
-// SAFETY: everything that the pointers lead to is owned by the value and never
-// changes once it is made.
+// SAFETY: everything that the pointers lead to is owned by the value and never changes once it is
+// made.
 unsafe impl Send for LayoutTable {}
 // SAFETY: as above.
 unsafe impl Sync for LayoutTable {}
@@ -172,7 +172,8 @@ impl LayoutTable {
     pub fn new(layout: &Layout) -> Self {
         let mut names: Vec<CString> = Vec::new();
         let mut name = |text: &str| {
-            // The address is taken where the string stays: moving a box ends what was borrowed of it.
+            // Take the address where the string stays: moving a box invalidates what was borrowed
+            // from it.
             names.push(text::owned(text));
             names.last().map_or(std::ptr::null(), |n| n.as_ptr())
         };
@@ -256,7 +257,7 @@ impl LayoutTable {
         }
     }
 
-    /// The structure; what it points to lives as long as `self`.
+    /// The structure; its pointers are valid as long as `self` lives.
     #[must_use]
     pub fn table(&self) -> &table::Layout {
         &self.table

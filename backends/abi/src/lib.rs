@@ -1,15 +1,14 @@
 //! The C ABI of engines: shared libraries that are loaded at run time.
 //!
-//! An engine plugin exports one function, which gives a table of functions. Its
-//! author sees the header `include/asid_backend.h` and nothing else; [`table`] is
-//! the same in Rust. From here two roads lead away:
+//! An engine plugin exports one function, which returns a table of functions. Its author sees only
+//! the header `include/asid_backend.h`; [`table`] is the same in Rust. There are two directions:
 //!
 //! - **in**: [`library::open`] opens a library, [`engine`](engine()) checks its table, and
-//!   [`Engine::backend`] makes it a backend like the built-in ones. The adapter checks
-//!   all that a caller could get wrong before the engine is called, keeps models
-//!   alive as long as batches and snapshots of them, and words what the engine says.
-//! - **out**: [`export_backend!`] makes a Rust engine such a library; panics and
-//!   handles that are no longer valid end at the table.
+//!   [`Engine::backend`] turns it into a backend like the built-in ones. The adapter checks
+//!   everything that a caller could get wrong before it calls the engine. It keeps models alive as
+//!   long as their batches and snapshots, and words the engine's errors.
+//! - **out**: [`export_backend!`] turns a Rust engine into such a library; panics and invalid
+//!   handles end at the table.
 //!
 //! All `unsafe` code of the project that is not an engine's own is in this crate.
 
@@ -42,8 +41,8 @@ use asid_core::{Error, Result};
 /// Opens a library and loads its engine.
 ///
 /// # Errors
-/// [`Error::Plugin`] where the file is no library, exports no engine, or exports
-/// one that this host cannot use.
+/// [`Error::Plugin`] when the file is not a library, exports no engine, or exports one that this
+/// host cannot use.
 pub fn open_engine(path: &Path) -> Result<Engine> {
     engine(library::open(path)?, path)?.ok_or_else(|| Error::Plugin {
         path: path.to_path_buf(),

@@ -1,7 +1,7 @@
 //! Shared libraries, opened once and never closed.
 //!
-//! What a library hands out (tables, names, functions) is used until the process
-//! ends, by any thread; closing one could only go wrong.
+//! What a library provides (tables, names, functions) is used until the process ends, by any
+//! thread, so closing it would be unsafe.
 
 use std::path::Path;
 
@@ -12,11 +12,11 @@ use crate::crash::{self, Action};
 /// An open library.
 pub type Library = libloading::Library;
 
-/// Opens a library. Opening runs the library's own initialisers.
+/// Opens a library, which runs the library's own initialisers.
 ///
 /// # Errors
-/// [`Error::Plugin`] where there is no such file, or it is no library that this
-/// process can load; the message is the system's, in one line.
+/// [`Error::Plugin`] when there is no such file, or this process cannot load it as a library; the
+/// message is the system's, in one line.
 pub fn open(path: &Path) -> Result<&'static Library> {
     let refuse = |message: String| Error::Plugin {
         path: path.to_path_buf(),
@@ -31,8 +31,8 @@ pub fn open(path: &Path) -> Result<&'static Library> {
     }
     crash::watch();
     let opened = Action::new(path, "opening the file (is it cut short?)").run(|| {
-        // SAFETY: the library's initialisers run. That a file named as a plugin is
-        // meant to be run is the user's decision, as with any program.
+        // SAFETY: the library's initialisers run. The user decides to run a file by naming it as a
+        // plugin, as with any program.
         unsafe { Library::new(&found) }
     });
     let library = opened.map_err(|e| {
@@ -44,7 +44,7 @@ pub fn open(path: &Path) -> Result<&'static Library> {
     Ok(Box::leak(Box::new(library)))
 }
 
-/// The system's own words, without the path that the message begins with anyway.
+/// The system's message, without the path with which it begins.
 fn why(error: &libloading::Error, path: &Path) -> String {
     let source = std::error::Error::source(error).map_or(error.to_string(), ToString::to_string);
     let text = source.replace(&format!("{}: ", path.display()), "");

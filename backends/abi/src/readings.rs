@@ -1,4 +1,5 @@
-//! Readings across the ABI: what is asked for, and whether what comes back are numbers.
+//! Readings across the ABI: the requested channels, and the check that the returned values are
+//! numbers.
 
 use asid_core::layout::{Channel, Layout, Recording};
 use asid_core::{Capabilities, Result, Status};
@@ -7,7 +8,7 @@ use crate::batch::BatchHandle;
 use crate::failure::broken;
 use crate::table::{self, channel_kind};
 
-/// Channels as the header has them.
+/// Channels in the header's form.
 #[must_use]
 pub fn channels(record: &Recording) -> Vec<table::Channel> {
     let channel = |kind, a: usize, b: usize| table::Channel {
@@ -40,7 +41,7 @@ fn describe(channel: Channel, layout: &Layout) -> String {
     }
 }
 
-/// Sees to it that readings of running simulations are numbers.
+/// Checks that readings of running simulations are numbers.
 ///
 /// # Errors
 /// A defect of the engine, naming channel, simulation and frame.
@@ -82,7 +83,7 @@ pub fn check(
     Ok(())
 }
 
-/// Sees to it that an engine is asked for contact forces only where it has them.
+/// Checks that contact forces are requested only from an engine that has them.
 ///
 /// # Errors
 /// As [`BatchHandle::require`].

@@ -6,14 +6,13 @@ use crate::batch::BatchHandle;
 use crate::hook::{self, HostHook};
 use crate::{readings, slices, table};
 
-/// Runs a rollout that has been checked, in a scene with `nq` positions, `nv`
-/// velocities and `nu` commands.
+/// Runs a checked rollout in a scene with `nq` positions, `nv` velocities and `nu` commands.
 ///
 /// # Errors
 /// The engine's own.
 ///
 /// # Panics
-/// Where the hook panicked: its panic goes on here, past the engine.
+/// When the hook panicked: its panic continues here, past the engine.
 pub fn run(
     batch: &mut BatchHandle,
     rollout: &Rollout<'_>,
@@ -66,7 +65,7 @@ pub fn run(
     };
     let run = batch.engine().table.rollout;
     let done = batch.call("rollout", run, |f, batch, error| {
-        // SAFETY: lengths are checked; all lives until the call returns.
+        // SAFETY: lengths are checked; everything lives until the call returns.
         unsafe { f(batch, &theirs, out.as_mut_ptr(), error) }
     });
     if let Some(host) = host {

@@ -1,11 +1,10 @@
 //! An engine's batch as a [`Simulator`].
 //!
-//! Everything that a caller could get wrong is checked here, before the engine
-//! is called: lengths, indices, numbers that are not finite, snapshots of other
-//! scenes. An engine behind the table may rely on it. What the engine gets wrong
-//! is caught as far as it can be seen from outside: a reading that is not a
-//! number although the simulation is said to run, and a call that reports a
-//! panic, after which the batch is not called again.
+//! Everything that a caller could get wrong is checked here before the engine is called: lengths,
+//! indices, non-finite numbers, snapshots of other scenes. An engine behind the table may rely on
+//! it. The engine's own faults are caught as far as they are visible from outside. These are
+//! readings that are not numbers although the simulation is reported as running, and calls that
+//! report a panic. After a panic the batch is not called again.
 
 use std::ptr::NonNull;
 use std::sync::Arc;
@@ -70,7 +69,7 @@ impl Simulator for LoadedSimulator {
         finite("parameters", values)?;
         let set = self.batch.engine().table.set_parameters;
         self.batch.call("set_parameters", set, |f, batch, error| {
-            // SAFETY: lengths are checked; all lives until the call returns.
+            // SAFETY: lengths are checked; everything lives until the call returns.
             unsafe {
                 f(
                     batch,
@@ -87,7 +86,7 @@ impl Simulator for LoadedSimulator {
         check_sims(sims, self.batch_size())?;
         let reset = self.batch.engine().table.reset;
         self.batch.call("reset", reset, |f, batch, error| {
-            // SAFETY: indices are checked; all lives until the call returns.
+            // SAFETY: indices are checked; everything lives until the call returns.
             unsafe { f(batch, slices::sims(sims), sims.len() as u64, error) }
         })?;
         self.batch.refresh(&mut self.status)
@@ -104,7 +103,7 @@ impl Simulator for LoadedSimulator {
         }
         let set = self.batch.engine().table.set_state;
         self.batch.call("set_state", set, |f, batch, error| {
-            // SAFETY: lengths are checked; all lives until the call returns.
+            // SAFETY: lengths are checked; everything lives until the call returns.
             unsafe {
                 f(
                     batch,
@@ -172,7 +171,7 @@ impl Simulator for LoadedSimulator {
         let channels = readings::channels(record);
         let read = self.batch.engine().table.read;
         self.batch.call("read", read, |f, batch, error| {
-            // SAFETY: lengths are checked; all lives until the call returns.
+            // SAFETY: lengths are checked; everything lives until the call returns.
             unsafe {
                 f(
                     batch,
@@ -196,7 +195,7 @@ impl Simulator for LoadedSimulator {
         let save = self.batch.engine().table.save;
         let mut pointer = std::ptr::null_mut();
         self.batch.call("save", save, |f, batch, error| {
-            // SAFETY: indices are checked; all lives until the call returns.
+            // SAFETY: indices are checked; everything lives until the call returns.
             unsafe {
                 f(
                     batch,
@@ -257,7 +256,7 @@ impl Simulator for LoadedSimulator {
         };
         self.batch
             .call("copy_state", Some(copy), |f, batch, error| {
-                // SAFETY: indices are checked; all lives until the call returns.
+                // SAFETY: indices are checked; everything lives until the call returns.
                 unsafe {
                     f(
                         batch,

@@ -2,17 +2,17 @@
 
 use asid_core::{Error, Result};
 
-// `usize` is the header's `uint64_t`, so lists of simulations cross as they are.
+// `usize` is the header's `uint64_t`, so lists of simulations are passed without conversion.
 const _: () = assert!(size_of::<usize>() == 8);
 
 /// An array of the other side; an empty one may be null.
 ///
 /// # Errors
-/// Where it is null and should have entries, or has more than memory could hold.
+/// When it is null and should have entries, or has more than memory could hold.
 ///
 /// # Safety
-/// `pointer` is null or points to `count` values that live and do not change for
-/// as long as the slice is used.
+/// `pointer` is null or points to `count` values that live and do not change for as long as the
+/// slice is used.
 pub unsafe fn read<'a, T>(pointer: *const T, count: u64, what: &str) -> Result<&'a [T]> {
     if count == 0 {
         return Ok(&[]);
@@ -24,7 +24,7 @@ pub unsafe fn read<'a, T>(pointer: *const T, count: u64, what: &str) -> Result<&
     if bytes.is_none_or(|b| b > isize::MAX as u64) {
         return Err(Error::Shape(format!("{what}: {count} entries")));
     }
-    // SAFETY: not null, aligned, of a possible size, and the rest is promised.
+    // SAFETY: not null, aligned, of a possible size; the caller promises the rest.
     Ok(unsafe { std::slice::from_raw_parts(pointer, count as usize) })
 }
 

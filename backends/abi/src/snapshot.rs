@@ -6,9 +6,9 @@ use std::sync::Arc;
 use crate::handle::ModelHandle;
 use crate::table;
 
-/// A snapshot of the engine with the model that it is of.
+/// A snapshot of the engine, with its model.
 pub struct SavedStates {
-    /// The scene that they are of, which lives as long as they do.
+    /// The scene of the states, which lives as long as they do.
     pub model: Arc<ModelHandle>,
     /// The engine's handle.
     pub pointer: NonNull<table::Snapshot>,

@@ -1,18 +1,17 @@
-//! The structures of `asid_backend.h` as Rust sees them.
+//! The structures of `asid_backend.h` in Rust.
 //!
-//! Field for field, in the same order and with the same names but for Rust's
-//! style; a test compiles the header and compares every size and offset. What the
-//! fields mean, and from which thread a function may be called, stands in the
-//! header and is not repeated here.
+//! They match field for field, in the same order and with the same names except for Rust's style. A
+//! test compiles the header and compares every size and offset. The header documents what the
+//! fields mean and from which thread a function may be called; this is not repeated here.
 
 use std::ffi::{c_char, c_void};
 
 use asid_core::Capabilities;
 
-/// Version of the ABI: another major is refused, a smaller minor is read as far
-/// as it goes.
+/// Version of the ABI. Another major version is refused; a smaller minor version is read as far as
+/// it goes.
 pub const ABI_MAJOR: u32 = 1;
-/// Grows when fields are added at the end of a structure.
+/// Minor version; grows when fields are added at the end of a structure.
 pub const ABI_MINOR: u32 = 0;
 /// Name of the exported function.
 pub const ENTRY: &str = "asid_backend_entry";
@@ -21,9 +20,9 @@ pub type EntryFn = unsafe extern "C" fn() -> *const Backend;
 /// No index.
 pub const NONE: u64 = u64::MAX;
 
-/// `asid_code`: what kind of thing went wrong.
+/// `asid_code`: the kind of an error.
 pub type Code = i32;
-/// Nothing went wrong.
+/// No error.
 pub const OK: Code = 0;
 /// The scene is refused.
 pub const SCENE: Code = 1;
@@ -108,8 +107,7 @@ macro_rules! c_structs {
             pub struct $name { $(pub $field: $type),* }
         )*
 
-        /// Name of each structure and of its fields in the header, with size and
-        /// offsets in bytes.
+        /// Name of each structure and its fields in the header, with size and offsets in bytes.
         #[must_use]
         pub fn shapes() -> Vec<Shape> {
             vec![$(Shape {
@@ -285,13 +283,13 @@ c_structs! {
     }
 }
 
-// SAFETY: a table is immutable for the life of the process, its functions may be
-// called from any thread as the header says, and what it points to is static.
+// SAFETY: a table is immutable for the life of the process, its functions may be called from any
+// thread as the header says, and what it points to is static.
 unsafe impl Sync for Backend {}
 // SAFETY: as above.
 unsafe impl Send for Backend {}
 
-/// Capabilities that an engine can claim over this table: its hook shows no parameters.
+/// Capabilities that an engine can claim over this table, whose hook cannot access parameters.
 #[must_use]
 pub fn capabilities() -> Capabilities {
     Capabilities::all() - Capabilities::LIVE_PARAMETERS

@@ -4,10 +4,10 @@ use std::ffi::{CStr, CString, c_char};
 
 use asid_core::{Error, Result};
 
-/// A text of the other side, copied.
+/// Copies a text of the other side.
 ///
 /// # Errors
-/// Says that `what` is missing or is no UTF-8.
+/// When `what` is missing or is not UTF-8.
 ///
 /// # Safety
 /// `text` is null or points to a zero-terminated string.
@@ -22,14 +22,14 @@ pub unsafe fn read(text: *const c_char, what: &str) -> Result<String> {
         .map_err(|_| Error::Failed(format!("{what} is not UTF-8")))
 }
 
-/// A text for the other side; what a C string cannot hold becomes a space.
+/// A text for the other side, in which characters that a C string cannot hold become spaces.
 #[must_use]
 pub fn owned(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// Reads a text out of a buffer of fixed size, in one line; a buffer without an
-/// end is read to its last byte.
+/// Reads a text from a buffer of fixed size, as one line. A buffer without a terminator is read to
+/// its last byte.
 #[must_use]
 pub fn from_buffer(buffer: &[c_char]) -> String {
     let bytes: Vec<u8> = buffer
@@ -41,7 +41,7 @@ pub fn from_buffer(buffer: &[c_char]) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Writes a text into a buffer of fixed size, cut at a character's border.
+/// Writes a text into a buffer of fixed size, truncated at a character boundary.
 pub fn into_buffer(text: &str, buffer: &mut [c_char]) {
     let Some(room) = buffer.len().checked_sub(1) else {
         return;

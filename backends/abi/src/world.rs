@@ -1,9 +1,8 @@
-//! The host's reading of a document, as the `asid_world` of the header.
+//! The host's reading of a document, as the header's `asid_world`.
 //!
-//! An engine without an MJCF compiler of its own builds its world from this: names
-//! given, defaults resolved, angles in radians, mass properties computed, places in
-//! the rows known. What the document holds beyond it is in a list of its own, so
-//! that nothing gets lost in silence.
+//! An engine without an MJCF compiler builds its world from this. Names are assigned, defaults
+//! resolved, angles in radians, mass properties computed, and indices into the rows known. A
+//! separate list names what the document holds beyond it, so that nothing is silently lost.
 
 mod drives;
 mod left_out;
@@ -19,12 +18,12 @@ use mjcf_rs::Model;
 
 use crate::table;
 
-/// A document as engines without a compiler of their own see it; owns everything
-/// that [`World::table`] points to.
+/// A document in the form for engines without a compiler; owns everything that [`World::table`]
+/// points to.
 pub struct World {
     table: table::World,
     layout: Layout,
-    // What `table` points to: each lies on the heap and is never changed.
+    // The targets of `table`'s pointers: each lies on the heap and never changes.
     _bodies: Vec<table::Body>,
     _joints: Vec<table::Joint>,
     _geoms: Vec<table::Geom>,
@@ -37,8 +36,8 @@ pub struct World {
     _rows: Rows,
 }
 
-// SAFETY: all that the pointers lead to is owned by the value, is made before it
-// is, and never changes.
+// SAFETY: everything that the pointers lead to is owned by the value, is made before it, and never
+// changes.
 unsafe impl Send for World {}
 // SAFETY: as above.
 unsafe impl Sync for World {}
@@ -47,8 +46,8 @@ impl World {
     /// Reads a scene.
     ///
     /// # Errors
-    /// [`Error::Scene`] where the document is no MJCF, names something that is not
-    /// there or the same thing twice, or holds a shape or number without a meaning.
+    /// [`Error::Scene`] when the document is not MJCF, refers to something that does not exist, has
+    /// a duplicate name, or holds a shape or number without a meaning.
     pub fn read(scene: &Scene) -> Result<Self> {
         let refuse = |message: String| Error::Scene {
             scene: scene.name().to_owned(),
@@ -119,20 +118,20 @@ impl World {
         })
     }
 
-    /// The structure; what it points to lives as long as `self`.
+    /// The structure; its pointers are valid as long as `self` lives.
     #[must_use]
     pub fn table(&self) -> &table::World {
         &self.table
     }
 
-    /// Names and places, as every engine gives them for this scene.
+    /// Names and indices, as every engine gives them for this scene.
     #[must_use]
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// Place of a named element among those of its kind (`body`, `geom`, `joint`,
-    /// `actuator`); `None` where there is none.
+    /// Index of a named element among those of its kind (`body`, `geom`, `joint`, `actuator`);
+    /// `None` where there is none.
     #[must_use]
     pub fn object(&self, element: &str, name: &str) -> Option<u64> {
         object(&self.layout, element, name)
@@ -150,19 +149,19 @@ fn object(layout: &Layout, element: &str, name: &str) -> Option<u64> {
     place.map(|i| i as u64)
 }
 
-/// Zero-terminated texts, each at one place for good.
+/// Zero-terminated texts with fixed addresses.
 #[derive(Default)]
 struct Texts(Vec<CString>);
 
 impl Texts {
-    /// Adds one; XML cannot hold the zero character that a C string cannot hold.
+    /// Adds a text. XML cannot contain the zero character, which a C string cannot hold.
     fn add(&mut self, text: &str) -> *const c_char {
         self.0.push(CString::new(text).unwrap_or_default());
         self.0.last().map_or(std::ptr::null(), |t| t.as_ptr())
     }
 }
 
-/// Rows of numbers, each at one place for good.
+/// Rows of numbers with fixed addresses.
 #[derive(Default)]
 struct Rows(Vec<Vec<f64>>);
 
@@ -173,7 +172,7 @@ impl Rows {
     }
 }
 
-/// The sites of a document: body and site.
+/// The sites of a document, each with its body.
 fn sites(model: &Model) -> impl Iterator<Item = (usize, &mjcf_rs::body::Site)> {
     let bodies = model.bodies.iter().enumerate();
     bodies.flat_map(|(i, entry)| entry.body.sites.iter().map(move |site| (i, site)))

@@ -1,5 +1,5 @@
-//! The header and the Rust table are the same: the system's C compiler says where
-//! every field lies and what every constant is.
+//! The header and the Rust table agree: the system's C compiler reports the offset of every field
+//! and the value of every constant.
 
 #![allow(clippy::unwrap_used)]
 
@@ -34,7 +34,7 @@ fn compile(source: &str, name: &str, arguments: &[&str], folder: &Path) -> std::
     out
 }
 
-/// What a C program that prints `name=value` lines says.
+/// Runs a C program that prints `name=value` lines, and returns them.
 fn printed(statements: &str) -> Vec<(String, u64)> {
     let folder = tempfile::tempdir().unwrap();
     let source = format!(
@@ -75,8 +75,8 @@ fn every_structure_has_one_shape() {
     assert_eq!(printed(&statements), ours);
 }
 
-/// Every field of the header is in the table: offsets alone would not show one
-/// that is missing at the end.
+/// Checks that every field of the header is in the table: offsets alone would not reveal a field
+/// missing at the end.
 #[test]
 fn every_structure_and_function_of_the_header_is_in_the_table() {
     let header = std::fs::read_to_string(format!("{INCLUDE}/asid_backend.h")).unwrap();

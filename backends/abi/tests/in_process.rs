@@ -1,7 +1,7 @@
-//! A Rust engine through its own table, out and in again, within one process.
+//! A Rust engine through its own table, exported and imported again within one process.
 //!
-//! Nothing is loaded and nothing is compiled, so that Miri can run all of it:
-//! `cargo xtask miri`.
+//! No library is loaded and nothing is compiled, so that Miri can run all of it: `cargo xtask
+//! miri`.
 
 #![allow(clippy::unwrap_used)]
 
@@ -17,7 +17,7 @@ use asid_core::{
 };
 use free_flight::FreeFlight;
 
-/// The engine as it is.
+/// The unmodified engine.
 struct Sound;
 
 impl Export for Sound {
@@ -26,7 +26,7 @@ impl Export for Sound {
     }
 }
 
-/// A table that lives as long as the process, where Miri finds it.
+/// A table that lives as long as the process, referenced so that Miri reports no leak.
 fn keep(table: abi::Backend) -> &'static abi::Backend {
     static KEPT: Mutex<Vec<&'static abi::Backend>> = Mutex::new(Vec::new());
     let table = Box::leak(Box::new(table));
@@ -80,7 +80,7 @@ impl StepHook for Drag {
     }
 }
 
-/// Everything a batch can do, as numbers.
+/// The results of all operations of a batch, as numbers.
 fn everything(backend: &dyn Backend) -> Vec<f64> {
     let model = backend.load(&scene()).unwrap();
     let mut sim = batch(&*model, 3);
@@ -150,7 +150,7 @@ fn loaded_is_linked_to_the_bit() {
 #[test]
 fn one_simulation_diverges_alone() {
     let model = engine::<Sound>().backend("e").load(&scene()).unwrap();
-    // More than the statuses that are asked for at a time.
+    // More simulations than statuses are requested at a time.
     let mut sim = batch(&*model, 66);
     let all: Vec<usize> = (0..66).collect();
     let mut qpos = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0].repeat(132);
@@ -289,7 +289,7 @@ fn a_snapshot_outlives_batch_and_model() {
     assert_eq!(snapshot.rows(), 1);
 }
 
-/// An engine that panics in rollouts of thirteen frames, and reads NaN in those of fourteen.
+/// An engine that panics in rollouts of thirteen frames, and returns NaN in those of fourteen.
 struct Faulty;
 struct FaultyModel(Arc<dyn Model>);
 struct FaultySimulator(Box<dyn Simulator>);
@@ -461,8 +461,8 @@ fn handles_that_were_destroyed_are_not_found() {
     };
     let (mut model, mut batch) = (std::ptr::null_mut(), std::ptr::null_mut());
     let sims = [0_u64, 1];
-    // SAFETY: every pointer is as the header asks, or a handle that the table
-    // gave, destroyed or not.
+    // SAFETY: every pointer is as the header requires, or a handle that the table gave, destroyed
+    // or not.
     unsafe {
         assert_eq!(t.load.unwrap()(&scene, &mut model, &mut error), abi::OK);
         let make = t.make_batch.unwrap();
@@ -492,7 +492,7 @@ fn handles_that_were_destroyed_are_not_found() {
         t.destroy_model.unwrap()(model);
         assert!(t.layout.unwrap()(model).is_null());
         assert_eq!(make(model, &config, &mut batch, &mut error), abi::SHAPE);
-        // Null is no handle, and null arrays are seen.
+        // Null is not a handle, and null arrays are detected.
         assert_eq!(
             reset(std::ptr::null_mut(), std::ptr::null(), 2, &mut error),
             abi::SHAPE
@@ -503,11 +503,11 @@ fn handles_that_were_destroyed_are_not_found() {
 #[test]
 fn wrong_tables_are_refused_with_a_reason() {
     let refuse = |spoil: &dyn Fn(&mut abi::Backend)| {
-        // The sound one is kept as well: what it points to has no other owner.
+        // The unmodified table is kept as well, because what it points to has no other owner.
         let mut table = *keep(table::<Sound>("an engine"));
         spoil(&mut table);
         let table = keep(table);
-        // SAFETY: a whole table; what is spoilt is what is being checked.
+        // SAFETY: a complete table; the spoilt part is what is being checked.
         match unsafe { Engine::from_table(table, Path::new("lib.so")) } {
             Err(Error::Plugin { message, .. }) => message,
             other => format!("{other:?}"),
@@ -526,7 +526,7 @@ fn wrong_tables_are_refused_with_a_reason() {
     assert!(null.unwrap_err().to_string().contains("NULL"));
     // A larger table of a later minor version is read as far as it is known.
     assert!(refuse(&|t| (t.abi_minor, t.size) = (7, t.size + 64)).starts_with("Ok"));
-    // What need not be there may be left out.
+    // Optional functions may be omitted.
     assert!(
         refuse(&|t| {
             t.capabilities &= !Capabilities::EXACT_SNAPSHOT.bits();

@@ -1,5 +1,5 @@
-//! Wrong engine plugins, really built: each gives one line that names the file and
-//! the reason, and the host goes on.
+//! Faulty engine plugins, actually built: each gives one line that names the file and the reason,
+//! and the host continues.
 
 #![allow(clippy::unwrap_used)]
 
@@ -42,11 +42,11 @@ fn scene() -> Scene {
     .unwrap()
 }
 
-/// Does with an engine what any run does, up to the first error.
+/// Uses an engine as a run does, up to the first error.
 fn use_engine(path: &Path) -> Result<()> {
     let model = open_engine(path)?.backend("still").load(&scene())?;
     let target = "joint/hinge/damping".parse()?;
-    // The engine changes nothing, and says so in its own words.
+    // The engine supports no parameters and says so in its own message.
     if let Err(error) = model.nominal(&target)
         && !error.to_string().contains("fixed (plugin")
     {
@@ -122,10 +122,10 @@ fn an_engine_without_a_fault_is_not_refused() {
     use_engine(&library).unwrap();
     let engine = open_engine(&library).unwrap();
     let model = engine.backend("still").load(&scene()).unwrap();
-    // The host's reading of the document stands in for a layout that is left out.
+    // The host's reading of the document replaces an omitted layout.
     assert_eq!(model.layout().bodies, ["world", "arm"]);
     assert_eq!(model.layout().geoms, ["geom0"]);
-    // What is not claimed is refused before the engine is asked.
+    // An unclaimed capability is refused before the engine is called.
     let mut sim = model
         .simulator(&BatchConfig {
             size: 1,

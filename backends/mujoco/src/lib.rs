@@ -1,17 +1,16 @@
 //! MuJoCo as a backend of ASID.
 //!
-//! MuJoCo is the reference engine: double precision, every part of MJCF, exact
-//! snapshots. A batch is one `mjBatch` of MuJoCo 3.17, which keeps a state row
-//! and the changed model fields of each simulation and runs them on a thread
-//! pool. A rollout is one call: on its thread, a simulation loops over frames
-//! and physics steps by itself and writes its readings where they belong.
+//! MuJoCo is the reference engine: double precision, every part of MJCF, exact snapshots. A batch
+//! is one `mjBatch` of MuJoCo 3.17, which keeps a state row and the changed model fields of each
+//! simulation and runs them on a thread pool. A rollout is one call. On its thread, each simulation
+//! loops over frames and physics steps and writes its readings into its part of the output.
 //!
 //! Three things differ from a plain loop over `mj_step`:
-//! - A reading is of the state at the end of its frame. After `mj_step`,
-//!   `sensordata` still belongs to the state before that step, so the first
-//!   half of the next step is taken early and continued, at no cost.
-//! - MuJoCo restarts a simulation with a bad state silently; here it is
-//!   reported as diverged and stands still.
+//! - A reading is of the state at the end of its frame. After `mj_step`, `sensordata` still belongs
+//!   to the state before that step, so the first half of the next step is taken early and
+//!   continued, at no cost.
+//! - MuJoCo silently restarts a simulation with a bad state. Here it is reported as diverged and
+//!   stands still.
 //! - Nothing is written to the console or to `MUJOCO_LOG.TXT`.
 
 mod compiled;

@@ -1,28 +1,26 @@
 //! rapier as a backend of ASID: pure Rust, no native library.
 //!
-//! A scene goes through `rapier3d-mjcf` into rapier's multibodies (articulated
-//! trees in reduced coordinates) and plain rigid bodies; a batch is a set of such
-//! worlds, each stepped by one thread at a time. What the loader leaves at a
-//! game's defaults or does not know is done here: mass properties, joint forces,
-//! drives, sensors, contact rules, friction.
+//! A scene goes through `rapier3d-mjcf` into rapier's multibodies (articulated trees in reduced
+//! coordinates) and plain rigid bodies. A batch is a set of such worlds, each stepped by one thread
+//! at a time. This crate adds what the loader leaves at a game's defaults or does not know: mass
+//! properties, joint forces, drives, sensors, contact rules, friction.
 //!
 //! # What it computes
 //!
-//! - Time is divided into substeps of at most 1 ms (at least two a step),
-//!   integrated semi-implicitly; each solves its constraints once, warm-started.
-//! - Springs, dampers and servos are implicit and solved together with the mass
-//!   matrix (module `drive`), so gains may be stiff. `frictionloss` is a bounded
-//!   constraint of each degree of freedom. Armature is added to the mass matrix.
-//! - Friction of contacts is Coulomb's, point by point, with MuJoCo's rules for
-//!   pairs (module `pairs`). rapier
-//!   turns the friction of a sliding point away from its slip; module `slip`
-//!   turns it back.
-//! - Torsional and rolling friction are torques from the normal force of the step
-//!   before (module `contact`).
-//! - A state is a copy of rapier's collections and continues to the bit. Setting
-//!   a state starts from the world as built, so it has no memory.
+//! - Time is divided into substeps of at most 1 ms (at least two a step), integrated
+//!   semi-implicitly. Each solves its constraints once, warm-started.
+//! - Springs, dampers and servos are implicit and solved together with the mass matrix (module
+//!   `drive`), so gains may be stiff. `frictionloss` is a bounded constraint of each degree of
+//!   freedom. Armature is added to the mass matrix.
+//! - Friction of contacts is Coulomb's, point by point, with MuJoCo's rules for pairs (module
+//!   `pairs`). rapier turns the friction of a sliding point away from its slip; module `slip` turns
+//!   it back.
+//! - Torsional and rolling friction are torques from the normal force of the previous step (module
+//!   `contact`).
+//! - A state is a copy of rapier's collections and continues to the bit. Setting a state starts
+//!   from the world as built, so it has no memory.
 //!
-//! # How well
+//! # Accuracy
 //!
 //! | what | error against theory |
 //! |---|---|
@@ -36,37 +34,34 @@
 //! | servo at half of critical damping, step response | 0.4 % of the step (backward Euler) |
 //! | slip of a 0.2 kg rod in a grip of 50 N, carried 0.6 m | 0.7 mm |
 //!
-//! # Where it differs from MuJoCo
+//! # Differences from MuJoCo
 //!
-//! - Single precision: a derivative by differences needs steps of about a
-//!   hundredth of a parameter's range.
-//! - Contacts are equally stiff everywhere (200 Hz, overdamped): `solref` and
-//!   `solimp` are not read, and restitution is zero; a `solref` that bounces is
-//!   refused. Contacts do not lift a sliding
-//!   body as MuJoCo's convex cone does, so trajectories depend on parameters more
-//!   smoothly.
-//! - Bounds of sliding, spinning and rolling friction are independent; a contact
-//!   that slides resists spinning no less. A sphere touches in one point.
-//! - In contacts with a moving link the direction of friction is corrected with
-//!   the inertia of the free body alone; contacts that stick are not corrected.
-//!   A contact with a tree solves its two directions apart.
-//! - How a face shares its load between its corners is left open by statics and
-//!   comes out otherwise: the moment of a spinning rod's ends is 3 % lower.
+//! - Single precision: a finite-difference derivative needs steps of about a hundredth of a
+//!   parameter's range.
+//! - Contacts are equally stiff everywhere (200 Hz, overdamped). `solref` and `solimp` are not
+//!   read, and restitution is zero; a `solref` that bounces is refused. Contacts do not lift a
+//!   sliding body as MuJoCo's convex cone does, so trajectories depend on parameters more smoothly.
+//! - Bounds of sliding, spinning and rolling friction are independent; a sliding contact resists
+//!   spinning no less. A sphere touches in one point.
+//! - In contacts with a moving link the direction of friction is corrected with the inertia of the
+//!   free body alone; sticking contacts are not corrected. A contact with a tree solves its two
+//!   directions separately.
+//! - Statics do not determine how a face shares its load between its corners, and rapier's solution
+//!   differs: the moment of a spinning rod's ends is 3 % lower.
 //! - `margin` and `gap` are not read; joint limits are hard.
-//! - Joints of one tree only are coupled by `<equality><joint>`, and linearly.
-//! - The saturation of a servo is judged by the force that it would reach at the
-//!   end of the step where MuJoCo takes that of the start.
-//! - Not simulated, and refused: `<general>` and other actuators with states,
-//!   tendons, flexes, meshes, height fields and ellipsoids in contact, fluids,
-//!   damped free joints, springs and limits of ball joints, a `<pair>` whose friction
-//!   differs by direction. Sensors other than
-//!   positions, orientations and velocities of frames and joints are refused when
-//!   they are asked for.
+//! - `<equality><joint>` couples only joints of one tree, and only linearly.
+//! - The saturation of a servo is judged by the force that it would reach at the end of the step,
+//!   where MuJoCo takes that of the start.
+//! - Not simulated, and refused: `<general>` and other actuators with states, tendons, flexes,
+//!   meshes, height fields and ellipsoids in contact, fluids, damped free joints, springs and
+//!   limits of ball joints, a `<pair>` whose friction differs by direction. Sensors other than
+//!   positions, orientations and velocities of frames and joints are refused when they are
+//!   requested.
 //!
 //! # Speed
 //!
-//! A Panda at rest beside a rod on a table takes 35 thousand steps a second on one
-//! core at a step of 2 ms, a gripped or pushed rod some 28; most of it is the mass
+//! A Panda at rest beside a rod on a table takes 35 thousand steps a second on one core at a step
+//! of 2 ms, and about 28 thousand with a gripped or pushed rod. Most of the time goes into the mass
 //! matrix of the arm. Saving or loading that state takes 8 µs, a quarter of a step.
 
 #[doc(hidden)]

@@ -27,7 +27,7 @@ pub(super) unsafe fn indices<'a>(list: *const u64, count: u64) -> Result<&'a [us
     unsafe { slices::read(list.cast::<usize>(), count, "the simulations") }
 }
 
-/// `count` rows of `width` numbers: how many there are.
+/// Total of numbers in `count` rows of `width` numbers.
 pub(super) fn numbers(count: u64, width: usize) -> Result<u64> {
     count
         .checked_mul(width as u64)
@@ -166,8 +166,8 @@ pub unsafe extern "C" fn copy_state(
     unsafe { guard(error, body) }
 }
 
-/// `status`. Simulations that do not exist, and those of a batch that has
-/// panicked, are said to have diverged.
+/// `status`. Simulations that do not exist, and those of a batch that panicked, are reported as
+/// diverged.
 pub unsafe extern "C" fn status(
     batch: *const table::Batch,
     first: u64,

@@ -1,4 +1,4 @@
-//! Handles as numbers that are looked up, never addresses that are followed.
+//! Handles: numbers that are looked up, never addresses that are dereferenced.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,7 +13,7 @@ use crate::table;
 pub struct ModelEntry {
     /// The engine's model.
     pub model: Arc<dyn Model>,
-    /// Its layout as the other side reads it.
+    /// Its layout in the form for the other side.
     pub layout: LayoutTable,
 }
 
@@ -21,13 +21,13 @@ pub struct ModelEntry {
 pub struct BatchEntry {
     /// The batch; `None` once it has panicked.
     pub simulator: Mutex<Option<Box<dyn Simulator>>>,
-    /// Names and places.
+    /// Names and indices.
     pub layout: Layout,
     /// Columns of its parameters.
     pub columns: usize,
 }
 
-/// What handles of one kind stand for.
+/// The values behind handles of one kind.
 pub struct Handles<T> {
     live: RwLock<HashMap<usize, Arc<T>>>,
     what: &'static str,
@@ -40,7 +40,7 @@ pub static BATCHES: LazyLock<Handles<BatchEntry>> = LazyLock::new(|| Handles::ne
 /// Snapshots.
 pub static SNAPSHOTS: LazyLock<Handles<Snapshot>> = LazyLock::new(|| Handles::new("snapshot"));
 
-/// The next handle; none is given twice, whatever its kind.
+/// The next handle; each number is used once, whatever its kind.
 static NEXT: AtomicUsize = AtomicUsize::new(1);
 
 impl<T> Handles<T> {
@@ -51,7 +51,7 @@ impl<T> Handles<T> {
         }
     }
 
-    /// A handle for a value.
+    /// Creates a handle for a value.
     pub fn insert<Opaque>(&self, value: T) -> *mut Opaque {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let mut live = self.live.write().unwrap_or_else(|e| e.into_inner());
@@ -59,10 +59,10 @@ impl<T> Handles<T> {
         std::ptr::without_provenance_mut(number)
     }
 
-    /// What a handle stands for.
+    /// The value behind a handle.
     ///
     /// # Errors
-    /// Where it was destroyed or never given.
+    /// When the handle was destroyed or never created.
     pub fn get<Opaque>(&self, handle: *const Opaque) -> Result<Arc<T>> {
         let live = self.live.read().unwrap_or_else(|e| e.into_inner());
         live.get(&handle.addr()).cloned().ok_or_else(|| {
@@ -73,14 +73,14 @@ impl<T> Handles<T> {
         })
     }
 
-    /// Forgets a handle; one that is not there is left alone.
+    /// Removes a handle; an unknown one is ignored.
     pub fn remove<Opaque>(&self, handle: *mut Opaque) -> Option<Arc<T>> {
         let mut live = self.live.write().unwrap_or_else(|e| e.into_inner());
         live.remove(&handle.addr())
     }
 }
 
-/// The batch of a handle, for this thread alone.
+/// The batch of a handle, locked for this thread.
 pub struct Held {
     entry: Arc<BatchEntry>,
 }
@@ -101,10 +101,10 @@ impl Held {
         &self.entry
     }
 
-    /// Runs something on the batch. A batch is gone after a panic.
+    /// Runs `body` on the batch; a panic removes the batch.
     ///
     /// # Errors
-    /// Where another thread uses the batch, or it has panicked before.
+    /// When another thread uses the batch, or it panicked before.
     pub fn run<R>(&self, body: impl FnOnce(&mut dyn Simulator) -> Result<R>) -> Result<R> {
         let mut guard: MutexGuard<'_, Option<Box<dyn Simulator>>> =
             match self.entry.simulator.try_lock() {

@@ -32,7 +32,7 @@ pub unsafe extern "C" fn load<E: Export>(
     unsafe { guard(error, body) }
 }
 
-/// The scene as this side has it.
+/// The scene in this side's form.
 ///
 /// # Safety
 /// `scene` points to a structure as the header describes it.
@@ -65,7 +65,7 @@ pub unsafe extern "C" fn destroy(model: *mut table::Model) {
 
 /// `layout`.
 pub unsafe extern "C" fn layout(model: *const table::Model) -> *const table::Layout {
-    // The entry stays where it is until the model is destroyed.
+    // The entry keeps its address until the model is destroyed.
     MODELS
         .get(model)
         .map_or(std::ptr::null(), |m| std::ptr::from_ref(m.layout.table()))
@@ -89,6 +89,8 @@ pub unsafe extern "C" fn nominal(
     unsafe { guard(error, body) }
 }
 
+/// Reads a target.
+///
 /// # Safety
 /// The names are null or zero-terminated.
 unsafe fn read_target(target: &table::Target) -> Result<Target> {

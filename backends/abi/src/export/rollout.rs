@@ -12,7 +12,7 @@ use super::handles::Held;
 use crate::slices;
 use crate::table::{self, Code, channel_kind};
 
-/// A recording from channels of the other side, which must be as wide as it says.
+/// A recording from channels of the other side, whose width must match the stated one.
 ///
 /// # Safety
 /// As [`slices::read`].
@@ -47,7 +47,7 @@ unsafe fn recording(
     Ok(recording)
 }
 
-/// The host's hook as this side calls it.
+/// The host's hook, as called by this side.
 struct ForeignHook {
     call: table::StepHook,
     context: *mut c_void,
@@ -65,8 +65,8 @@ impl StepHook for ForeignHook {
             ctrl: view.ctrl.as_mut_ptr(),
             force: view.force.as_mut_ptr(),
         };
-        // SAFETY: the arrays have the scene's lengths, as the header asks, and
-        // live until the call returns.
+        // SAFETY: the arrays have the scene's lengths, as the header requires, and live until the
+        // call returns.
         unsafe { (self.call)(self.context, row as u64, step as u64, &mut theirs) }
     }
 }

@@ -1,4 +1,4 @@
-//! Actuators, sensors and keyframes of a document as the header has them.
+//! Actuators, sensors and keyframes of a document in the header's form.
 
 use asid_core::layout::Layout;
 use mjcf_rs::Model;
@@ -8,7 +8,7 @@ use roxmltree::{Document, Node};
 use super::{Rows, Texts, object, sites};
 use crate::table::{self, actuator_kind};
 
-/// The elements of all sections of a name, in the document's order.
+/// The elements of all sections with a name, in the document's order.
 fn elements<'a>(
     xml: &'a Document<'_>,
     section: &'static str,
@@ -19,10 +19,10 @@ fn elements<'a>(
         .flat_map(|n| n.children().filter(Node::is_element))
 }
 
-/// Drives.
+/// Actuators.
 ///
 /// # Errors
-/// Where one names a joint that is not there.
+/// When one names a joint that does not exist.
 pub fn actuators(
     model: &Model,
     layout: &Layout,
@@ -52,7 +52,7 @@ pub fn actuators(
             .resolve(model.compiler.autolimits, actuator.force_range.is_some());
         drives.push(table::Actuator {
             name: texts.add(&place.name),
-            // What is attached from another document comes after all elements of this one.
+            // Actuators attached from another document come after all elements of this one.
             kind_name: texts.add(tags.next().unwrap_or("general")),
             kind,
             ctrl_limited: i32::from(place.ctrl_range.is_some()),
@@ -76,8 +76,9 @@ pub fn actuators(
     Ok(drives)
 }
 
-/// Place of an element that the document itself names: what has no name there cannot be
-/// meant there, whatever it is called afterwards.
+/// Index of an element that the document itself names.
+///
+/// An element without a name in the document cannot be meant, whatever name it gets later.
 fn stated(model: &Model, layout: &Layout, kind: &str, name: &str) -> Option<u64> {
     let named = match kind {
         "body" => name == "world" || model.body_id_by_name(name).is_some(),
@@ -92,13 +93,13 @@ fn stated(model: &Model, layout: &Layout, kind: &str, name: &str) -> Option<u64>
     object(layout, kind, name).filter(|_| named)
 }
 
-/// Attributes by which a sensor names its object, each for its own kind.
+/// Attributes with which a sensor names its object, one for each kind.
 const OBJECTS: [&str; 6] = ["joint", "body", "geom", "site", "actuator", "tendon"];
 
 /// Sensors.
 ///
 /// # Errors
-/// Where one names something that is not there.
+/// When one names something that does not exist.
 pub fn sensors(
     model: &Model,
     layout: &Layout,
@@ -149,7 +150,7 @@ pub fn sensors(
     Ok(list)
 }
 
-/// Starting states, every row full.
+/// Starting states, with every row complete.
 pub fn keyframes(layout: &Layout, texts: &mut Texts, rows: &mut Rows) -> Vec<table::Keyframe> {
     let keyframes = layout.keyframes.iter();
     keyframes

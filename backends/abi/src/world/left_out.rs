@@ -1,16 +1,15 @@
-//! What a document holds and the structure of the header does not.
+//! What a document holds beyond the header's structure.
 //!
-//! The list is what is not in the list of the known: an attribute that some later
-//! MJCF brings is left out, and said to be, until somebody teaches it here. A whole
-//! element is written `section/element`, such as `equality/weld`; an attribute
-//! `element/name attribute`, such as `geom/arm solref`, without `/name` where the
-//! element has none, and with `default/` before it in a class of defaults.
+//! The list contains everything that is not known here, so an attribute of a later MJCF is reported
+//! until this module knows it. A whole element is written `section/element`, such as
+//! `equality/weld`. An attribute is written `element/name attribute`, such as `geom/arm solref`,
+//! without `/name` if the element has none, and with `default/` before it in a class of defaults.
 
 use mjcf_rs::Model;
 use mjcf_rs::body::GeomType;
 use roxmltree::{Document, Node};
 
-/// Sections that hold no physics, or what is in the structure by other ways.
+/// Sections without physics, or whose content the structure holds in another form.
 const NEUTRAL_SECTIONS: [&str; 6] = [
     "visual",
     "statistic",
@@ -23,7 +22,7 @@ const NEUTRAL_SECTIONS: [&str; 6] = [
 /// Attributes of poses.
 const POSE: [&str; 6] = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
-/// Attributes that name, group or draw.
+/// Attributes that name, group or draw elements.
 const LABELS: [&str; 7] = [
     "name",
     "class",
@@ -34,7 +33,7 @@ const LABELS: [&str; 7] = [
     "user",
 ];
 
-/// Settings of how exactly something is computed.
+/// Settings of numerical accuracy.
 const PRECISION: [&str; 14] = [
     "apirate",
     "jacobian",
@@ -52,7 +51,7 @@ const PRECISION: [&str; 14] = [
     "mpr_tolerance",
 ];
 
-/// Flags that leave the motion as it is.
+/// Flags that do not affect the motion.
 const FLAGS: [&str; 11] = [
     "warmstart",
     "refsafe",
@@ -67,8 +66,7 @@ const FLAGS: [&str; 11] = [
     "sleep",
 ];
 
-/// Attributes of an element that the structure carries; `None` for an element that
-/// it does not know.
+/// Attributes of an element that the structure carries; `None` for an unknown element.
 fn known(tag: &str) -> Option<&'static [&'static str]> {
     Some(match tag {
         "compiler" => &[
@@ -140,7 +138,7 @@ const SENSOR: [&str; 9] = [
     "objtype", "objname", "joint", "body", "geom", "site", "actuator", "tendon", "noise",
 ];
 
-/// Sensors whose number of entries is known to be what the layout says.
+/// Sensors whose number of entries is known to match the layout.
 const SENSOR_KINDS: [&str; 37] = [
     "touch",
     "accelerometer",
@@ -181,7 +179,7 @@ const SENSOR_KINDS: [&str; 37] = [
     "e_kinetic",
 ];
 
-/// Lists it, in the document's order, each once.
+/// Lists what is left out, in the document's order and without duplicates.
 pub fn list(xml: &Document<'_>, model: &Model) -> Vec<String> {
     let mut found = Vec::new();
     for section in xml.root_element().children().filter(Node::is_element) {
@@ -214,7 +212,7 @@ pub fn list(xml: &Document<'_>, model: &Model) -> Vec<String> {
     once
 }
 
-/// Adds what is left out of an element and of what is in it.
+/// Adds what is left out of an element and of its children.
 fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
     let tag = node.tag_name().name();
     let parent = node.parent().map(|p| p.tag_name().name());
@@ -229,7 +227,7 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
             let known = known(tag).unwrap_or(&["joint", "gear"]);
             attributes(node, "actuator", known, found);
         }
-        // In a frame only places are composed; what else it holds the parser skips.
+        // Within a frame only poses are composed; the parser skips these elements.
         (_, "joint" | "freejoint" | "inertial") if parent == Some("frame") => {
             found.push(format!("frame/{tag}"));
         }
@@ -237,7 +235,7 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
             let known = known("motor").unwrap_or_default();
             attributes(node, &format!("default/{tag}"), known, found);
         }
-        // A class for something else matters where that is used, and is said there.
+        // A class for an unknown element matters where it is used, and is reported there.
         ("default", _) if known(tag).is_none() => return,
         (_, "camera" | "light") => return,
         (_, _) => match known(tag) {
@@ -257,7 +255,7 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
     }
 }
 
-/// Adds the attributes of an element that are not known and not at rest.
+/// Adds the attributes of an element that are unknown and not at their default.
 fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec<String>) {
     for attribute in node.attributes() {
         let (name, value) = (attribute.name(), attribute.value());
@@ -266,7 +264,7 @@ fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec
             || POSE.contains(&name)
             || (element == "option" && PRECISION.contains(&name))
             || at_rest(name, value);
-        // The mesh of a geom is found with its shape, defaults resolved.
+        // The mesh of a geom is reported with its shape, after defaults are resolved.
         let found_elsewhere = element.ends_with("geom") && ["mesh", "hfield"].contains(&name);
         if !carried && !found_elsewhere {
             found.push(labelled(element, node.attribute("name"), name));
@@ -274,7 +272,7 @@ fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec
     }
 }
 
-/// True where a value is the one that MJCF has anyway.
+/// Whether a value is MJCF's default.
 fn at_rest(name: &str, value: &str) -> bool {
     let mut numbers = value.split_whitespace().map(str::parse::<f64>);
     match name {
@@ -291,7 +289,7 @@ fn at_rest(name: &str, value: &str) -> bool {
     }
 }
 
-/// Adds the flags that switch a part of the physics off, or an override on.
+/// Adds the flags that disable a part of the physics, or enable an override.
 fn flags(node: Node<'_, '_>, found: &mut Vec<String>) {
     for flag in node.attributes() {
         let switched = match flag.name() {

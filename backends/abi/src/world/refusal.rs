@@ -1,4 +1,4 @@
-//! What no engine could make sense of, found before any is asked.
+//! Finds what no engine could interpret, before any engine is called.
 
 use std::collections::HashSet;
 
@@ -9,11 +9,10 @@ use mjcf_rs::body::{Geom, GeomType, JointType};
 use super::{sites, tree};
 use crate::table::{Body, Joint};
 
-/// Smallest mass of what moves, kg; MuJoCo's as well.
+/// Smallest mass of a moving body, kg; the same as MuJoCo's.
 const SMALLEST_MASS: f64 = 1e-15;
 
-/// Refuses names that stand for two things, and shapes, masses and numbers without
-/// a meaning.
+/// Refuses ambiguous names, and shapes, masses and numbers without a meaning.
 ///
 /// # Errors
 /// What is wrong, in one line.
@@ -71,7 +70,7 @@ pub fn check(model: &Model, layout: &Layout) -> Result<(), String> {
     Ok(())
 }
 
-/// Refuses a second thing of the same name.
+/// Refuses a duplicate name.
 fn unique<'a>(kind: &str, names: impl Iterator<Item = &'a String>) -> Result<(), String> {
     let mut seen = HashSet::new();
     for name in names {
@@ -94,7 +93,7 @@ fn numbers(pose: &mjcf_rs::Pose) -> [f64; 7] {
     [p.x, p.y, p.z, q.w, q.x, q.y, q.z]
 }
 
-/// Refuses a shape without an extent, and a mesh or height field that is not there.
+/// Refuses a shape without an extent, and a mesh or height field that does not exist.
 fn shape(geom: &Geom, model: &Model) -> Result<(), String> {
     let size = tree::size(geom);
     finite("has a pose or size without a value", &numbers(&geom.pose))?;
@@ -125,11 +124,12 @@ fn shape(geom: &Geom, model: &Model) -> Result<(), String> {
     Ok(())
 }
 
-/// A moving body that weighs nothing, its rigid attachments included. Meshes count
-/// as having a mass, which is not known here.
+/// Finds a moving body whose total mass, with its rigid attachments, is zero.
+///
+/// Meshes count as having a mass, which is not known here.
 pub fn weightless(model: &Model, bodies: &[Body], joints: &[Joint]) -> Option<usize> {
     let moves = |body: usize| joints.iter().any(|j| j.body == body as u64);
-    // A body is carried by the nearest body above it, or itself, that has a joint.
+    // The nearest body with a joint, itself or an ancestor, carries a body.
     let mut carried = vec![0.0; bodies.len()];
     for body in 1..bodies.len() {
         let mut carrier = body;

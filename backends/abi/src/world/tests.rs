@@ -66,24 +66,24 @@ fn bodies_have_parents_poses_and_masses() {
     assert_eq!(parents, [table::NONE, 0, 1, 0]);
     let half = 0.5_f64.sqrt();
     near(bodies[1].quat, [half, 0.0, 0.0, half]);
-    // A capsule: a cylinder between two half balls, 2 kg in all, its middle at 0.2 m.
+    // A capsule: a cylinder between two half spheres, 2 kg in total, with its middle at 0.2 m.
     let (r, h) = (0.05, 0.2);
     let cylinder = 2.0 * std::f64::consts::PI * r * r * h;
     let ball = 4.0 / 3.0 * std::f64::consts::PI * r * r * r;
     let along = 2.0 / (cylinder + ball) * (cylinder * r * r / 2.0 + ball * 0.4 * r * r);
     near(bodies[1].com, [0.2, 0.0, 0.0]);
     near([bodies[1].mass, bodies[1].inertia[0]], [2.0, along]);
-    // A box of the class's density.
+    // A box with the class's density.
     let mass = 2000.0 * 8.0 * 0.1 * 0.2 * 0.3;
     near([bodies[2].mass], [mass]);
     near(
         [bodies[2].inertia[0], bodies[2].inertia[2]],
         [mass * 0.13 / 3.0, mass * 0.05 / 3.0],
     );
-    // Half a turn about x + y exchanges x and y and turns z over.
+    // Half a turn about x + y exchanges x and y and reverses z.
     assert_eq!((bodies[2].inertial, bodies[3].inertial), (0, 1));
     near(bodies[3].inertia, [2.0, 1.0, 2.5, 0.0, 0.0, 0.0]);
-    // The principal axes of a document stay in its order.
+    // The principal axes of a document keep their order.
     near(bodies[3].moments, [1.0, 2.0, 2.5]);
     let half = 0.5_f64.sqrt();
     near(bodies[3].iquat, [0.0, half, half, 0.0]);
@@ -199,7 +199,7 @@ fn drives_sensors_and_keyframes_are_resolved() {
         ("key0".into(), "rest".into())
     );
     assert_eq!(list(keys[0].ctrl, 4), [1.0, 2.0, 3.0, 4.0]);
-    // What a key does not say is the document's own pose, at rest.
+    // A key that omits a value has the document's own pose, at rest.
     let rest = list(table.qpos0, table.nq);
     assert_eq!(list(keys[1].qpos, table.nq), rest);
     near(

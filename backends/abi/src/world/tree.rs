@@ -1,4 +1,4 @@
-//! Bodies, joints, geoms and sites of a document as the header has them.
+//! Bodies, joints, geoms and sites of a document in the header's form.
 
 use asid_core::layout::{JointKind, Layout};
 use asid_mjcf::mass::{GeomMass, MassProperties};
@@ -72,7 +72,7 @@ pub fn bodies(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::B
         .collect()
 }
 
-/// The `<inertial>` of a body, where the compiler's settings let it count.
+/// The `<inertial>` of a body, if the compiler's settings use it.
 fn stated(body: &Body, compiler: &Compiler) -> Option<MassProperties> {
     let given = body.inertial.as_ref()?;
     if compiler.inertia_from_geom == InertiaFromGeom::True && !body.geoms.is_empty() {
@@ -94,7 +94,7 @@ fn stated(body: &Body, compiler: &Compiler) -> Option<MassProperties> {
     })
 }
 
-/// Principal moments and their axes: in the document's own order where it states them.
+/// Principal moments and their axes, in the document's order where it states them.
 fn principal(
     body: &Body,
     stated: bool,
@@ -110,7 +110,7 @@ fn principal(
     mass.principal()
 }
 
-/// Lower limits that the compiler puts on masses and principal moments.
+/// Applies the compiler's lower limits on masses and principal moments.
 fn bounded(mut mass: MassProperties, compiler: &Compiler) -> MassProperties {
     mass.mass = mass.mass.max(compiler.bound_mass);
     let (moments, axes) = mass.principal();
@@ -129,7 +129,7 @@ fn geom_mass(geom: &Geom, model: &Model) -> Option<GeomMass> {
     GeomMass::of(&geom)
 }
 
-/// Joints with their places in the rows.
+/// Joints with their indices in the rows.
 pub fn joints(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::Joint> {
     let bodies = model.bodies.iter().enumerate();
     let joints = bodies.flat_map(|(i, b)| b.body.joints.iter().map(move |j| (i, j)));
@@ -140,7 +140,7 @@ pub fn joints(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::J
                 .limited
                 .resolve(model.compiler.autolimits, joint.range.is_some());
             let range = joint.range.unwrap_or_default();
-            // The parser turns degrees of hinges into radians, and of balls not.
+            // The parser converts degrees of hinges to radians, but not those of balls.
             let degrees = place.kind == JointKind::Ball && model.compiler.angle_is_degree;
             let axis = Vector3::from(joint.axis);
             table::Joint {
@@ -173,7 +173,7 @@ pub fn joints(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::J
         .collect()
 }
 
-/// Geoms, `fromto` resolved.
+/// Geoms, with `fromto` resolved.
 pub fn geoms(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::Geom> {
     let bodies = model.bodies.iter().enumerate();
     let geoms = bodies.flat_map(|(i, b)| b.body.geoms.iter().map(move |g| (i, g)));
@@ -221,7 +221,7 @@ fn geom_kind(kind: GeomType) -> i32 {
     }
 }
 
-/// Size of a geom as MJCF has it where there is no `fromto`.
+/// Size of a geom, as MJCF defines it without `fromto`.
 pub fn size(geom: &Geom) -> [f64; 3] {
     let Some([x1, y1, z1, x2, y2, z2]) = geom.fromto else {
         return geom.size;
