@@ -1,18 +1,20 @@
-//! Streams of different stamps as one table.
+//! Merges streams with different stamps into one table.
 //!
-//! Rows are the stamps of the stream that holds the most readings, while all that are as fast have readings. A reading of another stream that falls between two of its
-//! samples lies on the line between them, as a reading with a `delay` does (docs/logs.md): its noise is a little smaller there. Of a
-//! slower stream each sample goes to the row nearest to it, and the other rows are empty. A command is the mean of what was
-//! sent over its row, so that its integral is kept.
+//! Rows are the stamps of the stream with the most series, within the time in which all streams of
+//! about its rate have readings. A reading between two samples of another stream is interpolated
+//! linearly, like a reading with a `delay` (docs/logs.md); this makes its noise slightly smaller.
+//! Each sample of a slower stream goes to its nearest row, and the other rows are empty. A command
+//! is the mean of what was sent over its row, which preserves its integral.
 
 use crate::series::Series;
 
-/// A stream with fewer samples than this part of the rows is slower: its samples go to single rows.
+/// A stream with fewer samples than this share of the rows is slower: its samples go to single
+/// rows.
 const SLOWER: f64 = 0.7;
-/// Samples farther apart than this many usual ones have lost what is between them.
+/// Multiple of the usual step between samples beyond which samples were lost.
 pub const LOST: f64 = 2.5;
 
-/// The stamps of the stream that holds the most of some series, in order; of two such, the faster.
+/// The stamps of the stream with the most series, in order; of two such, the faster.
 #[must_use]
 pub fn rows(readings: &[&Series]) -> Vec<f64> {
     let mut streams: Vec<(&str, usize, usize)> = Vec::new();
@@ -25,7 +27,7 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
             None => streams.push((&s.stream, 1, s.time.len())),
         }
     }
-    // Of equals the first.
+    // On a tie, the first.
     streams.reverse();
     let main = streams
         .iter()
@@ -35,7 +37,7 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
     let mut stamps: Vec<f64> = of_main.flat_map(|s| s.time.iter().copied()).collect();
     stamps.sort_by(f64::total_cmp);
     stamps.dedup();
-    // A log begins and ends with rows that are whole: where a state starts must be told.
+    // The first and last row are complete: the initial state must be known.
     let count = stamps.len();
     for s in readings.iter().filter(|s| !is_slower(s, count)) {
         if let (Some(first), Some(last)) = (s.time.first(), s.time.last()) {
@@ -45,12 +47,12 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
     stamps
 }
 
-/// Whether a stream has far fewer samples than there are rows.
+/// Whether a series has far fewer samples than there are rows.
 fn is_slower(series: &Series, rows: usize) -> bool {
     (series.time.len() as f64) < SLOWER * rows as f64
 }
 
-/// A series' readings at some rows; NaN where it has none.
+/// A series' readings at the rows; NaN where it has none.
 #[must_use]
 pub fn readings(series: &Series, rows: &[f64]) -> Vec<f64> {
     let mut column = vec![f64::NAN; rows.len()];
@@ -60,7 +62,7 @@ pub fn readings(series: &Series, rows: &[f64]) -> Vec<f64> {
             let Some(row) = nearest(rows, *time) else {
                 continue;
             };
-            // Before its first sample and after its last a stream says nothing of a row.
+            // Before its first sample and after its last, a stream has no reading.
             if let Some(value) = on_line(series, rows[row], usual) {
                 column[row] = value;
             }
@@ -73,7 +75,7 @@ pub fn readings(series: &Series, rows: &[f64]) -> Vec<f64> {
     column
 }
 
-/// Median time between samples; infinite of a single one.
+/// Median time between samples; infinite for a single one.
 fn usual_step(series: &Series) -> f64 {
     let mut steps: Vec<f64> = series.time.windows(2).map(|w| w[1] - w[0]).collect();
     let middle = steps.len() / 2;
@@ -83,7 +85,7 @@ fn usual_step(series: &Series) -> f64 {
     *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The value at a time: a sample, or on the line between the two around it.
+/// The value at a time: that of a sample, or interpolated between two near samples.
 fn on_line(series: &Series, time: f64, usual: f64) -> Option<f64> {
     let after = series.time.partition_point(|t| *t < time);
     let b = *series.time.get(after)?;
@@ -104,7 +106,9 @@ fn nearest(rows: &[f64], time: f64) -> Option<usize> {
     there.min_by(|&a, &b| (rows[a] - time).abs().total_cmp(&(rows[b] - time).abs()))
 }
 
-/// A command over each row: the mean of what was sent from its stamp to the next; NaN before the first.
+/// A command over each row: the mean of what was sent from its stamp to the next.
+///
+/// NaN where nothing is known.
 #[must_use]
 pub fn commands(series: &Series, rows: &[f64]) -> Vec<f64> {
     let last = rows.len().saturating_sub(1);
@@ -117,7 +121,7 @@ pub fn commands(series: &Series, rows: &[f64]) -> Vec<f64> {
         };
         let held = series.time.partition_point(|t| *t <= from);
         let inside = held..series.time.partition_point(|t| *t < to);
-        // The first command is held before it was sent, as the contract of logs has it.
+        // The first command also holds before it was sent, as docs/logs.md defines.
         let mut value = match held.checked_sub(1) {
             Some(place) => series.values[place],
             None => match series.values.first() {
@@ -166,13 +170,13 @@ mod tests {
         assert_eq!(rows(&[&c, &a, &b]), a.time[1..4], "c runs from 3 to 393 ms");
         assert_eq!(rows(&[&a, &c]), c.time);
         assert!(rows(&[]).is_empty());
-        // Streams that are as fast decide where the log begins and ends; slower ones do not.
+        // Streams of the same rate limit the time of the log; slower ones do not.
         let (later, slow) = (line("/b", 0.1, 0.05, 4), line("/b", 0.4, 0.07, 1));
         assert_eq!(rows(&[&a, &a, &later]), a.time[1..4]);
         assert_eq!(rows(&[&a, &a, &slow]), a.time);
     }
 
-    /// A straight motion reads the same whatever the stamps are.
+    /// A linear motion reads the same at any stamps.
     #[test]
     fn other_streams_are_read_on_the_line_between_their_samples() {
         let rows: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();

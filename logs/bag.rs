@@ -1,7 +1,8 @@
 //! Bags of ROS 2: a folder of one or more files of SQLite or MCAP, or one file of SQLite.
 //!
-//! The table `topics` has name and type of each topic, `messages` the messages with the time of their receipt, ns, and, since
-//! Iron, `message_definitions` the text of each type. `metadata.yaml` repeats what the files say and is not read.
+//! The table `topics` has name and type of each topic, and `messages` the messages with their time
+//! of receipt, ns. Since Iron, `message_definitions` has the text of each type. `metadata.yaml`
+//! repeats the contents of the files and is not read.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -37,7 +38,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
         .is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
-/// The files of a bag, in the order that they were written in.
+/// The files of a bag, in the order of writing.
 fn files(path: &Path) -> Result<Vec<PathBuf>, String> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
@@ -49,7 +50,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, String> {
         .filter(|p| has_ending(p, "db3") || has_ending(p, "mcap"))
         .cloned()
         .collect();
-    // `name_2` before `name_10`.
+    // `name_2` comes before `name_10`.
     found.sort_by_key(|p| (p.as_os_str().len(), p.clone()));
     if !found.is_empty() {
         return Ok(found);
@@ -68,7 +69,7 @@ fn sqlite(path: &Path, topics: &mut Topics) -> Result<(), String> {
     let said = |e: rusqlite::Error| format!("is no bag of ROS 2 in SQLite, or a damaged one: {e}");
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let bag = Connection::open_with_flags(path, flags).map_err(said)?;
-    // A view could take for ever to answer.
+    // Accept tables only: a view could take arbitrarily long to answer.
     let tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')";
     let tables: i64 = bag.query_row(tables, [], |row| row.get(0)).map_err(said)?;
     if tables != 2 {

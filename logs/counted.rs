@@ -1,4 +1,4 @@
-//! What the numbers of a machine's quantities count, and whether the units of their columns count the same.
+//! Kinds of quantity of a machine's sensors and commands, and whether their columns' units match.
 
 use asid_core::layout::JointKind;
 use asid_core::{Error, Result};
@@ -10,8 +10,11 @@ use crate::episode::counts::{
 };
 use crate::episode::{ColumnMapping, unit_counts};
 
-/// What a quantity counts, in the words of [`crate::episode::counts`]: a sensor, an entry of one (`tip.0`), a command (`ctrl.elbow`) or
-/// `time`. `None` for what is not known, for quaternions, and for commands and tendons behind a gear, whose numbers are of any unit.
+/// The kind of a quantity, in the words of [`crate::episode::counts`].
+///
+/// `name` is a sensor, an entry of one (`tip.0`), a command (`ctrl.elbow`) or `time`. `None` for
+/// unknown kinds, for quaternions, and for commands and tendons behind a gear, whose numbers have
+/// any unit.
 #[must_use]
 pub fn counted(plant: &Plant, name: &str) -> Option<&'static str> {
     if name == "time" {
@@ -45,7 +48,7 @@ pub fn counted(plant: &Plant, name: &str) -> Option<&'static str> {
     }
 }
 
-/// What the command of an actuator counts.
+/// The kind of an actuator's command.
 fn command(plant: &Plant, actuator: &str) -> Option<&'static str> {
     let place = plant.layout.actuator(actuator).ok()?;
     let drive = plant.drives.get(place)?.filter(|d| d.gear == 1.0)?;
@@ -60,7 +63,7 @@ fn command(plant: &Plant, actuator: &str) -> Option<&'static str> {
     }
 }
 
-/// Whether a unit may be that of a quantity that counts this.
+/// Whether a unit fits a quantity of this kind.
 #[must_use]
 pub fn allows(counted: Option<&str>, unit: &str) -> bool {
     match (counted, unit_counts(unit)) {
@@ -69,7 +72,7 @@ pub fn allows(counted: Option<&str>, unit: &str) -> bool {
     }
 }
 
-/// Refuses a mapping whose unit counts something else than its quantity does.
+/// Refuses a mapping whose unit is of another kind than its quantity.
 ///
 /// # Errors
 /// When a unit is of the wrong kind; the message is one line.

@@ -1,8 +1,9 @@
-//! Tables of text with any names: CSV, with commas, semicolons or tabs.
+//! Text tables with any names: CSV, with commas, semicolons or tabs.
 //!
-//! [`crate::episode`] reads CSV files too. It knows the model and what each column is, and refuses a cell that is no
-//! number. Here neither is known yet: every column with numbers becomes a series, and [`propose`](crate::propose) finds
-//! out what it is. Both read the same [table](crate::text_table).
+//! [`crate::episode`] reads CSV files too. It knows the model and the meaning of each column, and
+//! refuses a cell that is not a number. Here neither is known yet: every column with numbers
+//! becomes a series, and [`propose`](crate::propose) finds its meaning. Both read the same
+//! [table](crate::text_table).
 
 use std::path::Path;
 
@@ -10,10 +11,10 @@ use crate::raw::RawLog;
 use crate::table_file::{self, Column};
 use crate::text_table::{TextTable, text};
 
-/// Reads a file. Cells that are no numbers are missing; columns without any number are left out.
+/// Reads a file. Cells that are not numbers are missing; columns without any number are left out.
 ///
 /// # Errors
-/// When the file is no table, a name stands twice in its header, or it has no column of stamps.
+/// When the file is no table, its header repeats a name, or it has no column of stamps.
 pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
     let text = text(path)?;
     let table = TextTable::of(&text)?;

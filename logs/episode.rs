@@ -1,9 +1,9 @@
-//! Reads logs: one file an episode, CSV or (with the feature `parquet`) Parquet, with the same columns.
+//! Reads logs: one file for each episode, CSV or (with the feature `parquet`) Parquet.
 //!
-//! A log is checked as it is read: whatever is wrong is told with its file, row and column, and what is ordinary
-//! (other columns, other units of time, doubled stamps, commands at a lower rate) is mended and noted.
-//! Rows of a CSV file are counted as an editor counts its lines; the first row of data of any other log is row 2, as that of a CSV file
-//! without comments is.
+//! Both have the same columns. A log is checked as it is read. Errors name the file, row and
+//! column. Ordinary deviations (other columns, other units of time, repeated stamps, commands at a
+//! lower rate) are repaired and noted. Rows of a CSV file are counted as an editor counts lines.
+//! The first row of data of any other log is row 2, as in a CSV file without comments.
 
 mod clock;
 mod csv;
@@ -30,9 +30,10 @@ pub use reader::is_of_start;
 pub use remapped::remapped;
 pub use table::{Table, of_table, quantities, wanted};
 
-/// Reads a log of a scene with this layout; a name that ends in `.parquet` is a Parquet
-/// file, any other CSV. Columns may come in any order, sensors may be missing, and columns that the scene does
-/// not know are passed over; columns `qpos.*` and `qvel.*` hold the state at the first row.
+/// Reads a log of a scene with this layout: `.parquet` as a Parquet file, any other name as CSV.
+///
+/// Columns may have any order, sensors may be missing, and unknown columns are skipped. Columns
+/// `qpos.*` and `qvel.*` hold the state at the first row.
 ///
 /// # Errors
 /// When the file cannot be read or a row or column is wrong; the message names both.
@@ -40,7 +41,7 @@ pub fn read(path: &Path, layout: &Layout) -> Result<Episode> {
     read_mapped(path, layout, &[]).map(|(episode, _)| episode)
 }
 
-/// Name of an entry of a sensor, as its column has it.
+/// Name of an entry of a sensor, as a column's name.
 fn entry_name(sensor: &str, len: usize, entry: usize) -> String {
     if len == 1 {
         sensor.to_owned()
@@ -49,7 +50,9 @@ fn entry_name(sensor: &str, len: usize, entry: usize) -> String {
     }
 }
 
-/// Reads a log whose columns mean what `mappings` say, as [`read`] does; with what was passed over or mended.
+/// Reads a log as [`read`] does, with mappings of its columns; also returns notes.
+///
+/// The notes list what was skipped or repaired.
 ///
 /// # Errors
 /// When the file cannot be read, or a row, a column or a mapping is wrong; the message names it.

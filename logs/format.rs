@@ -1,30 +1,34 @@
-//! Kinds of log files, and `[log]` of a study, which names the kind and the topics.
+//! Kinds of log files, and `[log]` of a study, which states the kind and the topics.
 //!
-//! A recording of another stack needs a reader in this crate, a [`LogFormat`] here, and an arm in `open.rs`. The project's
-//! own tables are read by [`crate::episode`]; a new format of these is a file and an arm there.
+//! A recording of another stack needs a reader in this crate, a [`LogFormat`] here, and an arm in
+//! `open.rs`. [`crate::episode`] reads the project's own tables; a new format of these needs a file
+//! and an arm there.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// What a log is.
+/// Kind of a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LogFormat {
-    /// A table of text, one row a stamp.
+    /// A text table, with one row for each stamp.
     Csv,
     /// The same table as a Parquet file.
     Parquet,
     /// [MCAP](https://mcap.dev) with messages of ROS 2 (CDR) or JSON.
     Mcap,
-    /// A bag of ROS 2: a folder with `metadata.yaml` and files of SQLite or MCAP, or one such file of SQLite.
+    /// A bag of ROS 2: a folder with `metadata.yaml` and files of SQLite or MCAP, or one file of
+    /// SQLite.
     Rosbag2,
-    /// A dataset of [LeRobot](https://github.com/huggingface/lerobot), version 2.1 or 3: a folder with `meta/info.json`.
+    /// A dataset of [LeRobot](https://github.com/huggingface/lerobot), version 2.1 or 3.
+    ///
+    /// A folder with `meta/info.json`.
     Lerobot,
 }
 
 impl LogFormat {
-    /// The kind that a path looks like; a table of text where nothing else fits.
+    /// The kind of a path, by its name and contents; a text table by default.
     #[must_use]
     pub fn of(path: &Path) -> Self {
         if path.is_dir() {
@@ -43,7 +47,7 @@ impl LogFormat {
         }
     }
 
-    /// Whether rows of one table hold all columns, as the project's own logs do.
+    /// Whether rows of one table hold all columns, as in the project's own logs.
     #[must_use]
     pub fn is_table(self) -> bool {
         matches!(self, Self::Csv | Self::Parquet)
@@ -66,10 +70,10 @@ impl LogFormat {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogSettings {
-    /// Format of the files; by their looks where it is left out.
+    /// Kind of the files; detected where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<LogFormat>,
-    /// Topics that are read; all where there are none.
+    /// Topics to read; all if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
 }

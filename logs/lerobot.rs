@@ -1,8 +1,9 @@
 //! Datasets of LeRobot, version 2.1 and 3: a folder with `meta/info.json` and tables in `data/`.
 //!
-//! `info.json` says the rate and, of each feature, the names of its entries. Version 3 packs many episodes into a file, version 2.1
-//! has a file an episode; the column `episode_index` tells in both which row is of which. A row has the observation of its time
-//! and the action that was sent upon it, as a row of the project's own logs does.
+//! `info.json` states the rate and the names of each feature's entries. Version 3 packs many
+//! episodes into a file, version 2.1 has a file for each; in both, the column `episode_index` tells
+//! a row's episode. A row has the observation at its time and the action that followed it, like a
+//! row of the project's own logs.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use crate::parquet_file;
 use crate::raw::RawLog;
 use crate::series::Series;
 
-/// Columns that number rows and are no readings.
+/// Columns that number rows and are not readings.
 const INDICES: [&str; 5] = [
     "index",
     "episode_index",
@@ -22,10 +23,12 @@ const INDICES: [&str; 5] = [
     "task_index",
     "timestamp",
 ];
-/// A stamp that is within this part of a frame of its number by the rate is that number: files hold stamps in single precision.
+/// Largest difference, in frames, of a stamp from its frame's time for the latter to count.
+///
+/// Files hold stamps in single precision.
 const ROUNDED: f64 = 0.02;
 
-/// `meta/info.json`, as far as it is needed.
+/// The required part of `meta/info.json`.
 #[derive(Debug, Deserialize)]
 struct Info {
     codebase_version: String,
@@ -39,10 +42,10 @@ struct Feature {
     names: Json,
 }
 
-/// Reads all episodes of a dataset, in order; each with its number.
+/// Reads all episodes of a dataset, in order, each with its number.
 ///
 /// # Errors
-/// When a file is missing or damaged, or the dataset is of another version.
+/// When a file is missing or damaged, or the dataset has another version.
 pub fn read(path: &Path) -> Result<Vec<(usize, RawLog)>, String> {
     let text = std::fs::read_to_string(path.join("meta/info.json"));
     let text = text.map_err(|e| format!("meta/info.json: {e}"))?;
@@ -78,7 +81,7 @@ pub fn read(path: &Path) -> Result<Vec<(usize, RawLog)>, String> {
     Ok(episodes.into_iter().collect())
 }
 
-/// Parquet files below `data/`, which has folders of chunks.
+/// Collects the Parquet files in `data/` and its folders of chunks.
 fn tables(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), String> {
     let said = |e: std::io::Error| format!("{}: {e}", folder.display());
     for entry in std::fs::read_dir(folder).map_err(said)? {
@@ -141,7 +144,7 @@ fn add(
     Ok(())
 }
 
-/// Name of a column: of an entry of a feature, the feature's and the entry's.
+/// Name of a column; for an entry of a feature, the names of both.
 fn feature_name(column: &str, info: &Info) -> String {
     let Some((feature, entry)) = column.rsplit_once('.') else {
         return column.to_owned();

@@ -1,13 +1,15 @@
-//! Logs as episodes: tables of this program's own, and recordings of other stacks.
+//! Reads logs as episodes: this program's own tables, and recordings of other stacks.
 //!
 //! - [`episode`] reads a table whose columns are named after the model, and checks it.
-//! - Recordings of ROS 2 (MCAP, or bags of SQLite), of LeRobot, and CSV of any names have names, units and rates of their own.
-//!   Each is read as [series] of numbers, with the stamps of its own stream and named by the way to the number. The
-//!   `[[column]]` of a study say what each series is on a model's machine; [`propose`] suggests them by names, units, ranges
-//!   and fit. Streams are [aligned](align), and [`episode::of_table`] checks the table that comes of it.
+//! - Recordings of ROS 2 (MCAP, or bags of SQLite), of LeRobot, and CSV with any names have names,
+//!   units and rates of their own. Each is read as [series] of numbers with the stamps of its own
+//!   stream; a name is the path to the number. The `[[column]]` of a study state which quantity of
+//!   the model each series is. [`propose`] suggests them by names, units, ranges and fit. Streams
+//!   are [aligned](align), and [`episode::of_table`] checks the resulting table.
 //!
-//! Readers believe nothing: a damaged or cut file is one line of error, whatever its bytes. The formats that need more
-//! than the default build has (SQLite, compression) are behind the features `ros` and `parquet`.
+//! Readers trust no input: a damaged or cut file gives one line of error, whatever its bytes.
+//! Formats that need more than the default build has (SQLite, compression) are behind the features
+//! `ros` and `parquet`.
 
 pub mod align;
 #[cfg(feature = "ros")]

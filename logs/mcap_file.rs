@@ -1,7 +1,7 @@
-//! MCAP files, read record by record, so that memory holds one record or piece of a chunk and not all of a file.
+//! MCAP files, read record by record: memory holds a record or a part of a chunk, not the file.
 //!
-//! The crate `mcap` finds the records and decompresses chunks. The three kinds of records that matter are taken apart
-//! here: its own parser reserves whatever length a damaged record states.
+//! The crate `mcap` finds the records and decompresses chunks. The three relevant kinds of records
+//! are parsed here, since its own parser allocates whatever length a damaged record states.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -17,22 +17,27 @@ use asid_documents::guard::guarded;
 
 use crate::ros::topics::{Described, Topics};
 
-/// Largest record, decompressed, bytes: recorders write messages of some MB, and a damaged length must not ask for all memory.
+/// Largest record, decompressed, bytes.
+///
+/// Recorders write messages of some MB, and a damaged length must not allocate all memory.
 const LARGEST_RECORD: u64 = 1 << 29;
-/// A record is at most this many times as long as its file: lz4 shrinks by at most 255 (its format), zstd
-/// shrinks what robots log by less.
+/// Largest ratio of a record's length to its file's.
+///
+/// lz4 compresses by at most 255 (its format), zstd by less on robots' logs.
 const MOST_COMPRESSED: u64 = 1 << 10;
-/// Bytes that are read at a time: a record that states more than the file holds takes no more memory than what is there.
+/// Bytes that are read at a time.
+///
+/// A record that states more than the file holds then takes no more memory than there are bytes.
 const PIECE: usize = 1 << 16;
 
-/// What a file says of a message type.
+/// A file's description of a message type.
 struct Schema {
     name: String,
     encoding: String,
     text: Vec<u8>,
 }
 
-/// What a file says of a topic.
+/// A file's description of a topic.
 struct Channel {
     topic: String,
     encoding: String,
@@ -84,7 +89,7 @@ fn told(error: McapError) -> String {
     }
 }
 
-/// What was read of a file so far.
+/// Descriptions read from a file so far.
 #[derive(Default)]
 struct Recording {
     schemas: HashMap<u16, Schema>,
@@ -92,7 +97,8 @@ struct Recording {
 }
 
 impl Recording {
-    /// Takes a record; those of other kinds are passed over ([MCAP, records](https://mcap.dev/spec#records)).
+    /// Processes a record; other kinds are skipped ([MCAP,
+    /// records](https://mcap.dev/spec#records)).
     fn take(&mut self, opcode: u8, data: &[u8], topics: &mut Topics) -> Result<(), String> {
         let mut fields = Fields(data);
         match opcode {
@@ -157,7 +163,7 @@ impl Recording {
     }
 }
 
-/// What is left of a record. Numbers are little-endian; texts and bytes follow their length of 4 bytes.
+/// The rest of a record. Numbers are little-endian; texts and bytes follow their 4-byte length.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -207,8 +213,10 @@ impl<'a> Fields<'a> {
 mod tests {
     use super::*;
 
-    /// Symptom: a file of 9 kB ended the process, "memory allocation of 4137475880 bytes failed". Cause: a channel
-    /// stated a topic of 4 GB, which the crate's parser reserved before it looked for it.
+    /// Symptom: a file of 9 kB ended the process, "memory allocation of 4137475880 bytes failed".
+    ///
+    /// Cause: a channel stated a topic of 4 GB, which the crate's parser allocated before it looked
+    /// for it.
     #[test]
     fn a_topic_of_4_gb_in_a_small_file_is_refused() {
         let mut bytes = vec![0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n'];
@@ -225,7 +233,8 @@ mod tests {
         assert!(error.contains("shorter than what it states"), "{error}");
     }
 
-    /// A record of half a gigabyte in a file of 17 bytes takes no half gigabyte.
+    /// A stated record of a quarter of a gigabyte in a file of 17 bytes must not allocate that
+    /// memory.
     #[test]
     fn a_record_longer_than_its_file_is_refused() {
         let mut bytes = vec![0x89, b'M', b'C', b'A', b'P', 0x30, b'\r', b'\n', op::SCHEMA];

@@ -1,7 +1,9 @@
-//! Logs as MCAP that Foxglove, Rerun and PlotJuggler open: messages of ROS 2 with their definitions.
+//! Writes logs as MCAP for Foxglove, Rerun and PlotJuggler: messages of ROS 2 with their
+//! definitions.
 //!
-//! Positions and speeds of joints are `sensor_msgs/msg/JointState` by the joints' names, on `/joint_states`; every other column is
-//! `std_msgs/msg/Float64` on a topic of its name. A missing reading is no message.
+//! Positions and speeds of joints are `sensor_msgs/msg/JointState` with the joints' names, on
+//! `/joint_states`. Every other column is `std_msgs/msg/Float64` on a topic of its name. A missing
+//! reading has no message.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -15,7 +17,9 @@ use crate::series::Series;
 
 /// Nanoseconds in a second.
 const SECOND: f64 = 1e9;
-/// Definitions of what is written (common_interfaces of ROS 2; Apache License 2.0), as MCAP's `ros2msg` has them.
+/// Definitions of the written messages, in MCAP's `ros2msg` format.
+///
+/// From common_interfaces of ROS 2; Apache License 2.0.
 const JOINT_STATE: &str = include_str!("ros/joint_state.msg");
 const FLOAT: &str = "float64 data\n";
 
@@ -122,11 +126,11 @@ fn topic(column: &str) -> String {
 }
 
 fn nanoseconds(time: f64) -> u64 {
-    // A log starts at 0; what is before it is at its start.
+    // A log starts at 0; earlier times become 0.
     (time * SECOND).round().max(0.0) as u64
 }
 
-/// What the joints read at one time.
+/// Readings of the joints at one time.
 #[derive(Default)]
 struct State {
     names: Vec<String>,

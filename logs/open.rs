@@ -9,18 +9,18 @@ use crate::csv_file;
 use crate::format::{LogFormat, LogSettings};
 use crate::raw::RawLog;
 
-/// What leads from a dataset's path to the number of an episode: `dataset#3`.
+/// Separates a dataset's path from the number of an episode: `dataset#3`.
 const EPISODE: char = '#';
 
-/// Opens logs; a dataset that holds many episodes is read once.
+/// Opens logs; a dataset of many episodes is read once.
 #[derive(Debug, Default)]
 pub struct Opener {
-    /// Datasets that were read: their episodes with numbers.
+    /// Datasets already read: their episodes with numbers.
     datasets: HashMap<PathBuf, Vec<(usize, RawLog)>>,
 }
 
 impl Opener {
-    /// The logs at a path: one, or of a dataset every episode; `dataset#3` is one episode.
+    /// The logs at a path: one log, or all episodes of a dataset; `dataset#3` is one episode.
     ///
     /// # Errors
     /// When the file cannot be read; the message names it.
@@ -72,7 +72,7 @@ impl Opener {
     }
 }
 
-/// The file that a path names, and the episode in it; a path that exists as it stands names no episode.
+/// Splits a path into a file and the number of an episode; an existing path has no number.
 #[must_use]
 pub fn split(path: &Path) -> (PathBuf, Option<usize>) {
     let text = path.to_string_lossy();
@@ -94,7 +94,7 @@ fn name_of(file: &Path) -> String {
     name.map_or_else(|| "log".into(), |n| n.to_string_lossy().into_owned())
 }
 
-/// What a build without a reader says.
+/// The error of a build without a reader.
 #[cfg(not(all(feature = "parquet", feature = "ros")))]
 fn lacking(what: &str) -> String {
     format!("is {what}, which this build cannot read: build with `--features logs`")

@@ -17,8 +17,9 @@ use crate::table_file::{self, Column};
 /// Longest list that is kept: states and actions of robots are shorter.
 const LONGEST_LIST: usize = 512;
 
-/// Columns of a file, by name in its order, NaN where there is no number; with `lists`, entries of lists are `name.0`,
-/// `name.1`, ….
+/// Columns of a file in its order, with their names; NaN where there is no number.
+///
+/// With `lists`, entries of lists are columns `name.0`, `name.1`, ….
 ///
 /// # Errors
 /// When the file is damaged.
@@ -128,7 +129,7 @@ fn number(field: &Field) -> f64 {
     }
 }
 
-/// Reads a table of any names.
+/// Reads a table with any names.
 ///
 /// # Errors
 /// When the file is damaged, or has no column of stamps.

@@ -1,9 +1,10 @@
-//! Proposes what the columns of a log are on a model's machine.
+//! Proposes which column of a log holds which quantity of a model's machine.
 //!
-//! Each pair of a quantity and a column gets points: for words that they share, for what is measured, for being sent or
-//! read, for its place in a list, for values that fit the range, and, once the readings are placed, for a command that
-//! looks like the position that follows it. The best pair is taken, then the best of what is left. It is a
-//! proposal: it is shown with its reasons, and what it says is looked at again by the check of wiring, which knows physics.
+//! Each pair of a quantity and a column gets points. They count shared words, the measure, whether
+//! the name says sent or read, the place in a list, and values that fit the range. Once the
+//! readings are assigned, they also count how well a command correlates with the position that
+//! follows it. The best pair is taken, then the best of the rest. The proposal is shown with its
+//! reasons, and the check of wiring, which knows physics, tests it again.
 
 mod fit;
 mod quantity;
@@ -27,16 +28,16 @@ use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;
 
-/// What a quantity is read from.
+/// The source of a quantity in a log.
 #[derive(Clone, Debug)]
 pub struct Match {
     /// The quantity's name: a sensor, an entry of one, or `ctrl.<actuator>`.
     pub name: String,
-    /// The mapping, where a column was found.
+    /// The mapping, if a column was found.
     pub mapping: Option<ColumnMapping>,
-    /// Why, in a few words each.
+    /// Reasons, in a few words each.
     pub reasons: Vec<String>,
-    /// Readings or commands in a second.
+    /// Readings or commands per second.
     pub rate: f64,
     /// Smallest and largest value, in the quantity's unit.
     pub values: [f64; 2],
@@ -47,18 +48,18 @@ pub struct Match {
 pub struct Proposal {
     /// Every quantity, commands first.
     pub matches: Vec<Match>,
-    /// Where the stamps are, of a table that does not call them `time`.
+    /// Mapping of the stamps, for a table that does not call them `time`.
     pub time: Option<ColumnMapping>,
-    /// Topics that are needed.
+    /// Topics that the mappings read.
     pub topics: Vec<String>,
-    /// Columns of the state of the first row: `qpos.*` and `qvel.*` of a table.
+    /// Columns of the initial state: `qpos.*` and `qvel.*` of a table.
     pub start: Vec<String>,
-    /// Columns that nothing is read from.
+    /// Columns that are not read.
     pub unused: Vec<String>,
 }
 
 impl Match {
-    /// Reads the quantity by another mapping from a log.
+    /// Replaces the mapping of the quantity, for the same log.
     pub fn remap(&mut self, mapping: ColumnMapping, log: &RawLog) {
         if let Some(series) = log.series(source(&mapping)) {
             (self.values, self.rate) = (values(series, &mapping), rate(series));
@@ -68,7 +69,7 @@ impl Match {
 }
 
 impl Proposal {
-    /// The mappings of a study: those that say more than a name does.
+    /// The mappings that a study needs: all that differ from the default of their name.
     #[must_use]
     pub fn mappings(&self) -> Vec<ColumnMapping> {
         let found = self.matches.iter().filter_map(|m| m.mapping.as_ref());
@@ -87,7 +88,7 @@ impl Proposal {
             .collect()
     }
 
-    /// How many sensors are read, entries of vectors counted one by one.
+    /// Number of sensor entries that have a column.
     #[must_use]
     pub fn readings(&self) -> usize {
         let found = self.matches.iter().filter(|m| m.mapping.is_some());
@@ -95,10 +96,10 @@ impl Proposal {
     }
 }
 
-/// Proposes a mapping for a log of a machine; `given` are quantities with their columns that are known already.
+/// Proposes a mapping for a log of a machine; `given` are known pairs of quantity and column.
 ///
 /// # Errors
-/// When the document is not valid MJCF, or a given name is not known.
+/// When the document is not valid MJCF, or a given name is unknown.
 pub fn propose(
     scene: &Scene,
     plant: &Plant,
@@ -185,7 +186,7 @@ pub fn propose(
     })
 }
 
-/// Why a column that somebody named cannot be read.
+/// Explains why a column that the user named cannot be read.
 fn no_column(log: &RawLog, column: &str) -> Error {
     match log.numberless.iter().find(|n| n.name == column) {
         None => Error::unknown("column", column, log.series.iter().map(|s| &*s.name)),
@@ -204,7 +205,7 @@ fn factor(unit: &Unit) -> f64 {
     unit.scale * unit.name.and_then(unit_factor).unwrap_or(1.0)
 }
 
-/// What was found for a quantity.
+/// The match of a quantity, with or without a candidate.
 fn matched(quantity: &Quantity, candidate: Option<&Candidate>, log: &RawLog) -> Match {
     let Some(candidate) = candidate else {
         return Match {
@@ -240,7 +241,7 @@ fn matched(quantity: &Quantity, candidate: Option<&Candidate>, log: &RawLog) -> 
     }
 }
 
-/// Values of a series in a second, but for stretches in which it has none; 0 where no time goes by.
+/// Values of a series per second, gaps excluded; 0 where no time passes.
 fn rate(series: &Series) -> f64 {
     let mut steps: Vec<f64> = series.time.windows(2).map(|w| w[1] - w[0]).collect();
     let middle = steps.len() / 2;

@@ -9,29 +9,29 @@ use crate::series::Series;
 /// A log of one episode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawLog {
-    /// Name: that of its file, with the episode's number where a file holds several.
+    /// Name of its file, with the episode's number where a file holds several.
     pub name: String,
     /// Its series, by name.
     pub series: Vec<Series>,
-    /// Column of the stamps, of a table.
+    /// Column of the stamps, for a table.
     pub stamps: Option<String>,
-    /// Columns of a table that hold no number.
+    /// Columns of a table without any number.
     pub numberless: Vec<Numberless>,
-    /// What a reader should know: streams that could not be read, and why.
+    /// Remarks for the user: streams that could not be read, and why.
     pub remarks: Vec<String>,
 }
 
-/// A column of a table that holds no number.
+/// A column of a table without any number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Numberless {
     /// Its name.
     pub name: String,
-    /// The first of its cells that is not empty; empty where all are, or where the format has no text.
+    /// Its first cell that is not empty; empty where all are, or where the format has no text.
     pub cell: String,
 }
 
 impl Numberless {
-    /// It and what it holds, in words.
+    /// Its name, with its first text if any.
     #[must_use]
     pub fn told(&self) -> String {
         if self.cell.is_empty() {
@@ -49,7 +49,9 @@ impl RawLog {
         self.series.iter().find(|s| s.name == name)
     }
 
-    /// Logs one after the other as one, with every series that any of them has: what one episode does not move another may.
+    /// Concatenates logs, with every series that any of them has.
+    ///
+    /// A quantity that rests in one episode may move in another.
     #[must_use]
     pub fn joined<'l>(logs: impl IntoIterator<Item = &'l Self>) -> Self {
         let mut logs = logs.into_iter();
@@ -93,7 +95,7 @@ impl RawLog {
         whole
     }
 
-    /// Seconds from the first stamp to the last.
+    /// Time from the first stamp to the last, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
         let ends = |s: &Series| Some((*s.time.first()?, *s.time.last()?));
@@ -105,8 +107,9 @@ impl RawLog {
         (last - first).max(0.0)
     }
 
-    /// The series of these names as a table (see [`align`]), and what was not among them, by stream. Time counts from the
-    /// first row.
+    /// The series of these names as a table (see [`align`]), and notes of the unused streams.
+    ///
+    /// Time counts from the first row.
     #[must_use]
     pub fn table(&self, commands: &[String], readings: &[String]) -> (Table, LogNotes) {
         let found = |names: &[String]| -> Vec<&Series> {
@@ -131,7 +134,7 @@ impl RawLog {
         (Table { time, columns }, notes)
     }
 
-    /// Streams of which nothing is among `chosen`, and single columns of a log that is one table.
+    /// Streams without a chosen series; for a log that is one table, columns that are not chosen.
     fn passed_over(&self, chosen: &[&Series]) -> Vec<String> {
         let mut used: HashMap<&str, bool> = HashMap::new();
         let mut order = Vec::new();

@@ -1,5 +1,5 @@
-//! Messages of ROS 2: what they are made of ([`definition`]), how they lie in bytes ([`cdr`]), and the series of numbers that a
-//! topic's messages make ([`stream`]).
+//! Messages of ROS 2: their [`definition`]s, their encoding ([`cdr`]), and series of a topic's
+//! numbers ([`stream`]).
 
 pub mod cdr;
 pub mod definition;

@@ -1,4 +1,4 @@
-//! A table of any names as a log: which column has the stamps.
+//! Converts a table with any names to a log: finds the column of the stamps.
 
 use crate::episode::seconds;
 use crate::raw::{Numberless, RawLog};
@@ -9,9 +9,9 @@ use crate::series::Series;
 pub struct Column {
     /// Its name.
     pub name: String,
-    /// Its numbers, one a row, NaN where there is none.
+    /// Its numbers, one for each row; NaN where there is none.
     pub values: Vec<f64>,
-    /// The first of its cells that is neither a number nor missing; empty where there is none.
+    /// Its first cell that is neither a number nor missing; empty if there is none.
     pub text: String,
 }
 
@@ -31,7 +31,7 @@ impl Column {
     }
 }
 
-/// Names of columns of stamps, as programs write them, the usual ones first.
+/// Names that programs give to columns of stamps, the usual ones first.
 const STAMPS: [&str; 12] = [
     "time",
     "timestamp",
@@ -47,10 +47,10 @@ const STAMPS: [&str; 12] = [
     "monotonic",
 ];
 
-/// Whether a name is one of a column of stamps, and how usual: lower is more so.
+/// Rank of a name as a column of stamps, the usual ones lower; `None` for other names.
 fn rank(name: &str) -> Option<usize> {
     let name = name.to_lowercase();
-    // A unit in brackets, or behind an underscore.
+    // Remove a unit in brackets, or after an underscore.
     let bare = name.split(['[', '(']).next().unwrap_or_default().trim();
     let units = ["_ns", "_us", "_ms", "_s", "_sec"];
     let plain = units
@@ -61,7 +61,7 @@ fn rank(name: &str) -> Option<usize> {
     at(bare).or_else(|| at(plain))
 }
 
-/// The column of stamps among some: by its name, else the first that only grows.
+/// The column of the stamps: by its name, else the first that strictly increases.
 #[must_use]
 pub fn stamps(columns: &[Column]) -> Option<usize> {
     let named = (0..columns.len()).filter_map(|i| Some((rank(&columns[i].name)?, i)));
@@ -75,7 +75,7 @@ pub fn stamps(columns: &[Column]) -> Option<usize> {
 /// The log of a table. Columns without a number are left out.
 ///
 /// # Errors
-/// When no column has stamps, or they are no numbers.
+/// When no column has stamps, or they are not numbers.
 pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
     let Some(place) = stamps(columns) else {
         let names: Vec<&str> = columns.iter().take(8).map(|c| &*c.name).collect();
@@ -111,7 +111,7 @@ pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
     })
 }
 
-/// Says that the column of stamps holds none that is a number.
+/// The error for a column of stamps without a number.
 fn numberless_stamps(stamps: &Column) -> String {
     let holds = if stamps.text.is_empty() {
         "is empty".to_owned()
@@ -124,7 +124,7 @@ fn numberless_stamps(stamps: &Column) -> String {
     )
 }
 
-/// A column as a series, its numbers in the order of their stamps; `None` where it has none.
+/// A column as a series, in the order of the stamps; `None` where it has no number.
 fn series(time: &[f64], column: &Column) -> Option<Series> {
     let points = time.iter().zip(&column.values);
     let mut points: Vec<(f64, f64)> = points

@@ -1,8 +1,9 @@
-//! Tables of text as loggers write them: what is comment, what divides cells, what is a number.
+//! Text tables as loggers write them: comments, cell separators and number formats.
 //!
-//! Lines that begin with `#` are comments, above the header and below it. The first other line is the header, unless it is a row of numbers
-//! below a comment that has as many cells, as NumPy writes its names. Cells are divided by commas, semicolons or tabs; where commas divide
-//! none, they may be decimal. Rows are counted as an editor counts lines, from 1.
+//! Lines that begin with `#` are comments, above the header and below it. The first other line is
+//! the header. An exception is a row of numbers below a comment with as many cells, as NumPy writes
+//! names. Commas, semicolons or tabs separate cells; commas that do not separate cells may be
+//! decimal. Rows are counted as an editor counts lines, from 1.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,13 +11,13 @@ use std::path::Path;
 use asid_documents::guard::one_line;
 use csv::StringRecord;
 
-/// How writers of CSV files put a missing number, besides an empty cell: NumPy and pandas, R, SQL, JSON.
+/// Spellings of a missing number besides an empty cell: NumPy and pandas, R, SQL, JSON.
 const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
 
-/// What begins a comment.
+/// Beginning of a comment.
 const COMMENT: char = '#';
 
-/// The text of a file, without the mark of its byte order, as Excel writes it.
+/// The text of a file, without a byte order mark, which Excel writes.
 ///
 /// # Errors
 /// When the file cannot be read.
@@ -26,7 +27,7 @@ pub fn text(path: &Path) -> Result<String, String> {
     Ok(text.trim_start_matches('\u{feff}').to_owned())
 }
 
-/// What stands between the cells of a table, and what is a number in one.
+/// Separator of a table's cells, and its number format.
 #[derive(Clone, Copy, Debug)]
 struct Marks {
     delimiter: u8,
@@ -38,9 +39,9 @@ struct Marks {
 pub struct TextTable<'t> {
     /// Names of its columns.
     pub header: Vec<String>,
-    /// Row of the header.
+    /// Line of the header.
     header_row: usize,
-    /// What is below the header, and its first row.
+    /// The text below the header, and its first line.
     body: &'t str,
     first_row: usize,
     marks: Marks,
@@ -49,27 +50,27 @@ pub struct TextTable<'t> {
 /// A row of a table.
 #[derive(Debug)]
 pub struct Row {
-    /// Its number.
+    /// Its line in the file.
     pub number: usize,
     cells: StringRecord,
     decimal_comma: bool,
 }
 
 impl Row {
-    /// What stands in a column.
+    /// The text in a column.
     #[must_use]
     pub fn cell(&self, column: usize) -> &str {
         self.cells.get(column).unwrap_or_default()
     }
 
-    /// The number in a column: NaN where it is missing, `None` where it is no finite number.
+    /// The number in a column: NaN where it is missing, `None` where it is not a finite number.
     #[must_use]
     pub fn number_in(&self, column: usize) -> Option<f64> {
         cell_number(self.cell(column), self.decimal_comma)
     }
 }
 
-/// The number in a cell: NaN where it is missing, `None` where it is no finite number.
+/// The number in a cell: NaN where it is missing, `None` where it is not a finite number.
 fn cell_number(text: &str, decimal_comma: bool) -> Option<f64> {
     if text.is_empty() || MISSING.iter().any(|m| text.eq_ignore_ascii_case(m)) {
         return Some(f64::NAN);
@@ -82,15 +83,15 @@ fn cell_number(text: &str, decimal_comma: bool) -> Option<f64> {
     number.ok().filter(|x: &f64| x.is_finite())
 }
 
-/// What stands between the cells of a table whose header is this: a comma, a semicolon or a tab, the most frequent.
+/// The separator of a header's cells: the most frequent of comma, semicolon and tab.
 fn delimiter(header: &str) -> u8 {
     let count = |mark: u8| header.bytes().filter(|b| *b == mark).count();
-    // The comma wins a draw: it is what the name says.
+    // The comma wins a tie, as in the format's name.
     let marks = [b'\t', b';', b','];
     marks.into_iter().max_by_key(|m| count(*m)).unwrap_or(b',')
 }
 
-/// A reader of rows.
+/// A reader of records.
 fn reader(text: &str, delimiter: u8) -> csv::Reader<&[u8]> {
     csv::ReaderBuilder::new()
         .has_headers(false)
@@ -108,13 +109,14 @@ fn cells(line: &str, delimiter: u8) -> Vec<String> {
     cells.iter().map(str::to_owned).collect()
 }
 
-/// Whether a line is no row.
+/// Whether a line is blank or a comment.
 fn is_void(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with(COMMENT)
 }
 
-/// Refuses a header in which a name stands twice: which of the two columns is meant, nobody can say. Empty names do not count, as of the
-/// index that pandas writes.
+/// Refuses a header with a repeated name, which would be ambiguous.
+///
+/// Empty names do not count, as pandas writes one for its index.
 fn refuse_twice(header: &[String]) -> Result<(), String> {
     let mut seen: HashMap<&str, usize> = HashMap::new();
     for (i, name) in header.iter().enumerate().filter(|(_, n)| !n.is_empty()) {
@@ -130,10 +132,10 @@ fn refuse_twice(header: &[String]) -> Result<(), String> {
 }
 
 impl<'t> TextTable<'t> {
-    /// Finds the header of a text, and how its numbers are written.
+    /// Finds the header of a text, and its number format.
     ///
     /// # Errors
-    /// When there is no header, a name stands twice in it, or no row is below it.
+    /// When there is no header, it repeats a name, or no row follows it.
     pub fn of(text: &'t str) -> Result<Self, String> {
         if text.trim().is_empty() {
             return Err("is empty: record it again, or leave it out".into());
@@ -191,7 +193,7 @@ impl<'t> TextTable<'t> {
         None
     }
 
-    /// Whether numbers have decimal commas: some has one, and none a point.
+    /// Whether numbers have decimal commas: at least one has, and none has a point.
     fn has_decimal_commas(&self) -> bool {
         if self.marks.delimiter == b',' {
             return false;
@@ -208,7 +210,7 @@ impl<'t> TextTable<'t> {
         commas
     }
 
-    /// The rows below the header, each as long as it, or one line that says which is not.
+    /// The rows below the header; an error of one line for a row of another length.
     pub fn rows(&self) -> impl Iterator<Item = Result<Row, String>> {
         let mut reader = reader(self.body, self.marks.delimiter);
         let (mut at, mut number) = (0, self.first_row);
@@ -223,7 +225,7 @@ impl<'t> TextTable<'t> {
                 let start = cells.position().map_or(0, |p| p.byte() as usize);
                 number += newlines(&self.body[at..start]);
                 at = start;
-                // A record begins where the one before it ended: before blank lines and comments.
+                // A record begins where the previous one ended: before blank lines and comments.
                 for line in self.body[start..]
                     .split_inclusive('\n')
                     .take_while(|l| is_void(l))
@@ -231,7 +233,7 @@ impl<'t> TextTable<'t> {
                     at += line.len();
                     number += 1;
                 }
-                // Spaces alone are no row.
+                // Spaces alone are not a row.
                 if cells.len() > 1 || cells.iter().any(|c| !c.is_empty()) {
                     return Some(self.row(number, cells));
                 }
@@ -239,7 +241,7 @@ impl<'t> TextTable<'t> {
         })
     }
 
-    /// A row of some cells, as many as the header's; empty ones beyond it do not count.
+    /// A row of as many cells as the header has; further empty cells are ignored.
     fn row(&self, number: usize, cells: StringRecord) -> Result<Row, String> {
         let expected = self.header.len();
         if cells.len() < expected || cells.iter().skip(expected).any(|c| !c.is_empty()) {
@@ -258,7 +260,7 @@ impl<'t> TextTable<'t> {
     }
 }
 
-/// Ends of lines in a text.
+/// Number of line ends in a text.
 fn newlines(text: &str) -> usize {
     text.bytes().filter(|b| *b == b'\n').count()
 }
@@ -277,7 +279,7 @@ mod tests {
         said
     }
 
-    /// The numbers of a table, and the numbers of its rows.
+    /// The numbers of a table, and the lines of its rows.
     fn numbers(text: &str) -> (Vec<Vec<f64>>, Vec<usize>) {
         let table = TextTable::of(text).unwrap();
         let rows: Vec<Row> = table.rows().map(Result::unwrap).collect();
@@ -320,7 +322,7 @@ mod tests {
             numbers("t;x\n0;-5,25\n1;1,5e-3\n").0,
             [[0.0, -5.25], [1.0, 1.5e-3]]
         );
-        // Beside decimal points a comma divides thousands, or nobody knows.
+        // With decimal points present, a comma may group thousands: it is ambiguous.
         let table = TextTable::of("t;x\n0.5;1,234\n").unwrap();
         let row = table.rows().next().unwrap().unwrap();
         assert_eq!((row.number_in(0), row.number_in(1)), (Some(0.5), None));

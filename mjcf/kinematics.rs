@@ -46,8 +46,8 @@ impl Chain {
     /// The chain from the world to the site of this name.
     ///
     /// # Errors
-    /// When there is no such site, a joint of the chain is neither hinge nor slide, a body on it
-    /// has several joints, or it has more than [`MAX_LINKS`] joints.
+    /// When there is no such site, or the chain has more than [`MAX_LINKS`] joints. Also when a
+    /// joint of it is neither hinge nor slide, or a body on it has several joints.
     pub fn to_site(scene: &Scene, site: &str) -> Result<Self> {
         let model = scene.description()?;
         let fail = |message: String| Error::Scene {

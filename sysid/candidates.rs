@@ -1,10 +1,9 @@
 //! Costs of candidate motions, with no more simulations than their ranking needs.
 //!
 //! A candidate is simulated at the middle of the unknowns. If it keeps the limits there, it is
-//! simulated a step up and down in each unknown, for its information. In the order of the resulting
-//! costs, candidates are then simulated far from the middle, with limits checked after every
-//! physics step, until enough of them keep the limits. The others keep their costs without that
-//! check.
+//! simulated a step up and down in each unknown, for its information. Candidates are then simulated
+//! far from the middle, in the order of their costs, with limits checked after every physics step.
+//! This ends once enough of them keep the limits. The others keep their costs without that check.
 
 use asid_algorithms::fisher::Objective;
 use asid_core::Parameter;

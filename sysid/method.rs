@@ -70,9 +70,10 @@ pub struct DesignSettings {
     pub iterations: usize,
     /// Candidates in a round.
     pub population: usize,
-    /// Physics steps of the whole search, which bound its time: after them no round begins, but at
-    /// least 8 rounds are done. Two cores take about 5e5 steps of an arm of six joints per second;
-    /// steps of a machine with more coordinates count for more.
+    /// Physics steps of the whole search, which bound its time.
+    ///
+    /// After them no round begins, but at least 8 rounds are done. Two cores take about 5e5 steps
+    /// of an arm of six joints per second; steps of a machine with more coordinates count for more.
     pub physics_steps: f64,
 }
 

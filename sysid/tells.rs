@@ -27,8 +27,8 @@ const STEP: f64 = 0.02;
 ///
 /// Some changes of a reading are about equally large for any step: those of a contact that comes a
 /// time step earlier or later, or of a machine that amplifies small differences. Divided by a short
-/// step they look like information that no identification finds. Over this step, a seventh of the
-/// way to the end of a uniform range, they count a twelfth as much as over [`STEP`], and smooth
+/// step they look like information that no identification finds. This step is a seventh of the way
+/// to the end of a uniform range. Over it they count a twelfth as much as over [`STEP`], and smooth
 /// machines are nearly as linear.
 const SEARCH_STEP: f64 = 0.25;
 

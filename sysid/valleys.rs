@@ -1,13 +1,15 @@
 //! A search among the local minima (valleys) of a rough loss.
 //!
-//! Where bodies make and break contact, a step of a hundredth of a prior standard deviation changes
-//! which contact comes first, and the loss of open-loop replays jumps. A linear fit over a region
-//! of such a loss predicts a minimum that its own replay does not confirm, and damped steps end in
-//! the first of many valleys. The point that a fit arrives at is therefore replayed. If its loss
-//! exceeds the best replay's by more than chance explains, the search continues by covariance
-//! matrix adaptation (N. Hansen, arXiv:1604.00772). Draws about the best point are ranked by their
-//! own replays, and the mean of the draws averages over single jumps. The uncertainty of the values
-//! remains that of the fit over the whole region, roughness included.
+//! Where bodies make and break contact, the loss of open-loop replays jumps: a step of a hundredth
+//! of a prior standard deviation changes which contact comes first. A linear fit over a region of
+//! such a loss predicts a minimum that its own replay does not confirm. Damped steps end in the
+//! first of many valleys.
+//!
+//! The point that a fit arrives at is therefore replayed. If its loss exceeds the best replay's by
+//! more than chance explains, the search continues by covariance matrix adaptation (N. Hansen,
+//! arXiv:1604.00772). Draws about the best point are ranked by their own replays, and the mean of
+//! the draws averages over single jumps. The uncertainty of the values remains that of the fit over
+//! the whole region, roughness included.
 
 use asid_algorithms::fisher::inverse_above_prior;
 use asid_algorithms::optimise::cma_es::{CmaEs, CmaEsSettings};

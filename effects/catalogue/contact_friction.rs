@@ -1,9 +1,11 @@
 //! The friction coefficients of a contact.
 //!
 //! A site is one geom of a pair that can touch: the fixed one, else the one whose friction counts.
-//! A pair takes the larger coefficient of its two geoms. The effect therefore scales three
-//! coefficients: the site's own, that of every partner whose coefficient is at least as large or
-//! has the priority, and that of anything that lies free on a fixed site.
+//! A pair takes the larger coefficient of its two geoms. The effect therefore scales
+//!
+//! - the site's own coefficient,
+//! - that of every partner whose coefficient is at least as large or has the priority, and
+//! - that of anything that lies free on a fixed site.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
 use asid_core::{Capabilities, Result, Target};

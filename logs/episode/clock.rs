@@ -1,23 +1,27 @@
-//! The clock of a log: the unit of its stamps, and rows that are doubled or out of order.
+//! The clock of a log: the unit of its stamps, and rows that are repeated or out of order.
 
 use super::notes::LogNotes;
 
-/// Rows slower than this are no record of a machine's motion, s: such stamps are in a finer unit.
+/// Longest row time of a machine's record, s: slower stamps must be in a finer unit.
 const SLOWEST: f64 = 0.7;
-/// The same for a unit finer than the second, s. Lower, for stamps of a fast log in the next finer unit look like those of a
-/// slow log in this one: 500 us against 500 ms.
+/// Longest row time for units finer than the second, s.
+///
+/// It is shorter because stamps of a fast log in the next finer unit look like those of a slow log
+/// in this one: 500 us against 500 ms.
 const SLOWEST_FINE: f64 = 0.3;
 /// Stamps beyond this count from 1970, s: the year 2001.
 const EPOCH: f64 = 1e9;
-/// Rows that are this many row times too early are taken for late arrivals and put in order; farther back the clock was set.
+/// Number of row times by which a row may be early to count as a late arrival, which is sorted.
+///
+/// A larger step back means that the clock was set.
 const LATE_ARRIVAL: f64 = 10.0;
-/// Most physics steps of one log: beyond it a single replay lasts minutes, and the stamps are wrong.
+/// Most physics steps of a log: beyond it a single replay takes minutes, and the stamps are wrong.
 const MOST_STEPS: f64 = 2e7;
 
-/// Units of stamps from the coarsest on: name, and their length in s.
+/// Units of stamps from the coarsest on: name, and length in s.
 const STAMPS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
 
-/// Median time between rows, of the steps that go forward; `None` where there is none.
+/// Median of the positive time steps between rows; `None` where there is none.
 fn row_time(stamps: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).collect();
     steps.retain(|dt| *dt > 0.0);
@@ -25,15 +29,17 @@ fn row_time(stamps: &[f64]) -> Option<f64> {
     (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Unit of some stamps: by their date where they count from 1970, else the coarsest in which rows come as fast as a
-/// machine is sampled.
+/// Unit of stamps: by their date if they count from 1970, else by their rate.
+///
+/// The rate selects the coarsest unit in which rows are as frequent as a machine is sampled.
 fn unit(stamps: &[f64]) -> (&'static str, f64) {
     let first = stamps.first().copied().unwrap_or(0.0);
-    // A date of this century lies within a factor of ten above the year 2001 in its unit.
+    // In its own unit, a date of this century is one to ten times the year 2001.
     let dated = STAMPS
         .iter()
         .find(|(_, length)| (EPOCH..10.0 * EPOCH).contains(&(first * length)));
-    // Small stamps are no date in any coarse unit; a nanosecond count since boot may look like one in us.
+    // Small stamps are no date in any coarse unit. A count of ns since boot may look like a date in
+    // us.
     let fits = |(name, length): &(&str, f64)| {
         let slowest = if *name == "s" { SLOWEST } else { SLOWEST_FINE };
         row_time(stamps).is_none_or(|dt| dt * length < slowest)
@@ -43,8 +49,9 @@ fn unit(stamps: &[f64]) -> (&'static str, f64) {
     *dated.or(by_rate).unwrap_or(&STAMPS[0])
 }
 
-/// Brings stamps to seconds; `given` is the factor that the study states. Stamps in another unit than the second, and dates,
-/// begin at 0.
+/// Converts stamps to seconds; `given` is the factor that the study states.
+///
+/// Dates, and stamps in another unit than the second, are counted from the first.
 pub(super) fn to_seconds(stamps: &mut [f64], given: Option<f64>, notes: &mut LogNotes) {
     let (name, length) = match given {
         Some(length) => ("s", length),
@@ -62,14 +69,17 @@ pub(super) fn to_seconds(stamps: &mut [f64], given: Option<f64>, notes: &mut Log
     stamps.iter_mut().for_each(|t| *t = (*t - start) * length);
 }
 
-/// Brings stamps of an unknown unit to seconds, as the reader of logs does; the unit where it is not the second.
+/// Converts stamps of an unknown unit to seconds; returns the unit if it is not the second.
 pub fn seconds(stamps: &mut [f64]) -> Option<&'static str> {
     let mut notes = LogNotes::default();
     to_seconds(stamps, None, &mut notes);
     notes.time_unit
 }
 
-/// Order of the rows in time: doubled stamps once, the last of them; late arrivals where they belong. Messages call rows by `numbers`.
+/// Order of the rows in time: late arrivals are sorted, and the last of rows with one stamp is
+/// kept.
+///
+/// Messages name rows by `numbers`.
 pub(super) fn order(
     time: &[f64],
     numbers: &[usize],
@@ -89,7 +99,7 @@ pub(super) fn order(
     let mut rows: Vec<usize> = (0..time.len()).collect();
     rows.sort_by(|&a, &b| time[a].total_cmp(&time[b]));
     let all = rows.len();
-    // Of rows with one stamp the last stays.
+    // Of rows with the same stamp, keep the last.
     let mut kept: Vec<usize> = Vec::with_capacity(all);
     for row in rows {
         match kept.last_mut() {
@@ -101,7 +111,7 @@ pub(super) fn order(
     Ok(kept)
 }
 
-/// Refuses a log that no simulator replays within minutes; messages call rows by `numbers`.
+/// Refuses a log that no simulator replays within minutes; messages name rows by `numbers`.
 pub(super) fn check_duration(time: &[f64], numbers: &[usize], timestep: f64) -> Result<(), String> {
     let (Some(first), Some(last)) = (time.first(), time.last()) else {
         return Ok(());
@@ -124,7 +134,7 @@ pub(super) fn check_duration(time: &[f64], numbers: &[usize], timestep: f64) -> 
 mod tests {
     use super::*;
 
-    /// Stamps of `n` rows at some rate, from a start, in a unit of some length.
+    /// Stamps of 50 rows at some rate, from a start, in a unit of some length.
     fn stamps(start: f64, rate: f64, length: f64) -> Vec<f64> {
         (0..50)
             .map(|k| ((start + f64::from(k) / rate) / length).round())
@@ -136,7 +146,8 @@ mod tests {
         for (name, length) in &STAMPS[1..] {
             for rate in [10.0, 50.0, 100.0, 1000.0] {
                 for start in [0.0, 37.5, 1.7e9] {
-                    // Whole ns of today are beyond what a double resolves at 1 kHz only by parts of a percent.
+                    // Doubles resolve today's ns stamps to 256 ns, less than 0.1 % of a row time at
+                    // 1 kHz.
                     let told = unit(&stamps(start, rate, *length));
                     assert_eq!(told.0, *name, "{rate} Hz from {start} s");
                 }

@@ -1,15 +1,17 @@
-//! Readings and commands that are late are given to the times that they tell of.
+//! Shifts late readings and commands to the times that they belong to.
 
 use asid_core::Episode;
 use asid_core::layout::Layout;
 
-/// Rows over which a late reading is interpolated, at most: beyond them the motion between is not a line.
+/// Most rows over which a late reading is interpolated: over more the motion is not linear.
 const SPAN: usize = 2;
-/// Share of a row time within which a reading belongs to a row without interpolation: stamps are rounded.
+/// Share of a row time within which a reading belongs to a row as it is, since stamps are rounded.
 const ON_ROW: f64 = 1e-3;
 
-/// Moves readings of some columns: each is `delay` (s) older than its stamp. Between rows they lie on a line; beyond the
-/// last row they are missing. `delays` has one entry a column of readings.
+/// Shifts readings that are `delay` (s) older than their stamps.
+///
+/// Between rows they are interpolated linearly; beyond the last row they are missing. `delays` has
+/// one entry for each column of readings.
 pub(super) fn readings(episode: &mut Episode, layout: &Layout, delays: &[f64]) {
     let width = episode.width();
     let before = episode.readings.clone();
@@ -22,7 +24,7 @@ pub(super) fn readings(episode: &mut Episode, layout: &Layout, delays: &[f64]) {
         if delays[columns.clone()].iter().all(|d| *d == 0.0) {
             continue;
         }
-        // An orientation is late as a whole.
+        // The entries of an orientation have one delay.
         let whole = |c: usize| if rotation { delay } else { delays[c] };
         for c in columns.clone() {
             let present = |k: usize| {
@@ -54,7 +56,9 @@ pub(super) fn readings(episode: &mut Episode, layout: &Layout, delays: &[f64]) {
     }
 }
 
-/// The readings on both sides of a time, and how far between them it lies; `None` where they are missing or far apart.
+/// The rows before and after a time, and its relative position between them.
+///
+/// `None` where readings are missing or far apart.
 fn between(time: &[f64], at: f64, present: &dyn Fn(usize) -> bool) -> Option<(usize, usize, f64)> {
     let after = time.partition_point(|t| *t < at);
     let near = |k: usize| {
@@ -76,12 +80,14 @@ fn between(time: &[f64], at: f64, present: &dyn Fn(usize) -> bool) -> Option<(us
     Some((a, b, (at - time[a]) / (time[b] - time[a])))
 }
 
-/// Delays commands: those of a row are the mean over it of what arrives. `delays` has one entry an actuator.
+/// Delays commands: the command of a row is the mean of what arrives during it.
+///
+/// `delays` has one entry for each actuator.
 pub(super) fn commands(episode: &mut Episode, delays: &[f64]) {
     let (nu, rows) = (delays.len(), episode.time.len());
     let before = episode.ctrl.clone();
     for (a, &delay) in delays.iter().enumerate().filter(|(_, d)| **d != 0.0) {
-        // Integral of the command that is held, from the first row on.
+        // Integral of the held command from the first row on.
         let mut sums = vec![0.0; rows];
         for k in 1..rows {
             let dt = episode.time[k] - episode.time[k - 1];
@@ -90,7 +96,7 @@ pub(super) fn commands(episode: &mut Episode, delays: &[f64]) {
         let integral = |t: f64| -> f64 {
             let k = episode.time.partition_point(|x| *x <= t);
             match k {
-                // Before the first row it was the same as in it.
+                // Before the first row the command is the same as in it.
                 0 => before[a] * (t - episode.time[0]),
                 _ => sums[k - 1] + before[(k - 1) * nu + a] * (t - episode.time[k - 1]),
             }

@@ -1,13 +1,13 @@
-//! What a log's columns mean, where they do not mean what their names say: `[[column]]` in a study.
+//! Mappings of a log's columns to quantities of the model: `[[column]]` in a study.
 //!
-//! A log of another stack has names, units, signs and zeros of its own. A mapping states them once, and every
-//! reader applies it, so that logs are used as they were recorded.
+//! Logs of other stacks have names, units, signs and zeros of their own. A mapping states them
+//! once, and every reader applies it, so that logs are used as they were recorded.
 
 use asid_core::layout::Layout;
 use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// What a unit counts, in words.
+/// Kinds of quantity that a unit measures, in words.
 pub mod counts {
     /// rad and its multiples.
     pub const ANGLE: &str = "an angle";
@@ -25,13 +25,13 @@ pub mod counts {
     pub const TORQUE: &str = "a torque";
     /// s.
     pub const TIME: &str = "a time";
-    /// A share of anything.
+    /// A ratio, of any quantity.
     pub const SHARE: &str = "";
 }
 
 use counts::{ACCELERATION, ANGLE, ANGULAR_SPEED, FORCE, LENGTH, SHARE, SPEED, TIME, TORQUE};
 
-/// Units by name, with the factor that brings them to SI (NIST SP 811, appendix B) and what they count.
+/// Units: name, factor to SI (NIST SP 811, appendix B), and kind of quantity.
 const UNITS: [(&str, f64, &str); 24] = [
     ("rad", 1.0, ANGLE),
     ("mrad", 1e-3, ANGLE),
@@ -59,23 +59,25 @@ const UNITS: [(&str, f64, &str); 24] = [
     ("%", 1e-2, SHARE),
 ];
 
-/// How far factors that are the same may differ, relative: by what digits of files round.
+/// Largest relative difference of equal factors: files round their digits.
 const SAME_FACTOR: f64 = 1e-9;
 
-/// One `[[column]]`: the quantity `name` of the model is
-/// `sign * scale * (column in SI units) + offset`, `delay` seconds before the row's time.
+/// One `[[column]]` of a study.
+///
+/// The quantity `name` of the model is `sign * scale * (column in SI units) + offset`, `delay`
+/// seconds before the row's time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnMapping {
     /// A sensor, an entry of one (`sensor.0`), `ctrl.<actuator>`, or `time`.
     pub name: String,
-    /// The log's column; of a whole vector the part before `.0`. Without it, `name`.
+    /// The log's column; for a whole vector the part before `.0`. By default `name`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<String>,
-    /// Unit of the column, such as `deg` or `mm`. Without it, the SI unit.
+    /// Unit of the column, such as `deg` or `mm`. By default the SI unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// 1, or -1 where the column counts the other way.
+    /// 1, or -1 where the column has the opposite direction.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub sign: f64,
     /// Factor besides unit and sign; not 0.
@@ -84,7 +86,7 @@ pub struct ColumnMapping {
     /// Added after sign, unit and scale, in the SI unit of the quantity.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub offset: f64,
-    /// How much older than its stamp a reading is, s; of a command, how much later it acts.
+    /// Age of a reading at its stamp, s; for a command, the time until it acts.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub delay: f64,
 }
@@ -118,14 +120,16 @@ impl ColumnMapping {
         }
     }
 
-    /// Factor of the column, with sign and unit; 1 for a unit that is not known.
+    /// Factor of the column, with sign and unit; an unknown unit counts as 1.
     #[must_use]
     pub fn factor(&self) -> f64 {
         let unit = self.unit.as_deref().and_then(unit_factor).unwrap_or(1.0);
         self.sign * self.scale * unit
     }
 
-    /// The same mapping with a unit alone, or none, in place of a unit and a scale that make the factor of one of the same kind.
+    /// Simplifies a unit and a scale to one unit of the same kind, or to none for the SI unit.
+    ///
+    /// Nothing changes where no single unit has their factor.
     #[must_use]
     pub fn in_one_unit(mut self) -> Self {
         let Some(counts) = self.unit.as_deref().and_then(unit_counts) else {
@@ -142,17 +146,18 @@ impl ColumnMapping {
         self
     }
 
-    /// The lines of a study file.
+    /// The mapping as lines of a study file.
     #[must_use]
     pub fn lines(&self) -> String {
         let body = toml::to_string(self).unwrap_or_default();
         format!("[[column]]\n{}", body.trim_end())
     }
 
-    /// Refuses what makes no sense for a model with this layout.
+    /// Checks the mapping against a model with this layout.
     ///
     /// # Errors
-    /// When the name is none of the model's, or a value is out of its domain; the message is one line.
+    /// When the name is none of the model's, or a value is out of its domain; the message is one
+    /// line.
     pub fn check(&self, layout: &Layout) -> Result<()> {
         let fail = |message: String| Error::Config {
             key: "column".into(),
@@ -193,14 +198,16 @@ impl ColumnMapping {
     }
 }
 
-/// Factor that brings a unit to SI; `None` for one that is not known.
+/// Factor of a unit to SI; `None` for an unknown unit.
 #[must_use]
 pub fn unit_factor(unit: &str) -> Option<f64> {
     let found = UNITS.iter().find(|(name, ..)| *name == unit);
     found.map(|(_, factor, _)| *factor)
 }
 
-/// What a unit counts, in words of [`counts`]; `None` for one that is not known, and for a share, which goes with any quantity.
+/// Kind of quantity that a unit measures, in the words of [`counts`].
+///
+/// `None` for an unknown unit, and for a ratio, which fits any quantity.
 #[must_use]
 pub fn unit_counts(unit: &str) -> Option<&'static str> {
     let found = UNITS.iter().find(|(name, ..)| *name == unit);
@@ -209,7 +216,7 @@ pub fn unit_counts(unit: &str) -> Option<&'static str> {
         .filter(|counts| *counts != SHARE)
 }
 
-/// What a mapping may name: sensors, their entries, commands.
+/// Names that a mapping may have: sensors, their entries, commands.
 fn names(layout: &Layout) -> Vec<String> {
     let mut all = Vec::new();
     for s in &layout.sensors {
@@ -222,7 +229,7 @@ fn names(layout: &Layout) -> Vec<String> {
     all
 }
 
-/// Where the quantity `name` (entry `entry` of a vector) is in a log, and how its column is read.
+/// The log's column of a quantity or an entry of one, and how its numbers are converted.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Source {
     /// Name of the log's column.
@@ -231,12 +238,12 @@ pub(super) struct Source {
     pub factor: f64,
     /// Added after the factor.
     pub offset: f64,
-    /// How late it is, s.
+    /// Delay, s.
     pub delay: f64,
 }
 
 impl Source {
-    /// Of a quantity under some mappings: that of the entry before that of the whole vector.
+    /// The source of a quantity; a mapping of the entry precedes that of the whole vector.
     pub(super) fn of(mappings: &[ColumnMapping], name: &str, entry: Option<usize>) -> Self {
         let own = match entry {
             Some(i) => format!("{name}.{i}"),

@@ -1,30 +1,32 @@
-//! What was passed over or mended as a log was read.
+//! Notes of what was skipped or repaired while a log was read.
 
-/// What a reader did beside reading.
+/// What a reader skipped and repaired.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogNotes {
     /// Columns that the model does not know, in the log's order.
     pub passed_over: Vec<String>,
-    /// Columns among them that look like a misspelt sensor or command: the column, and the name that the model has.
+    /// Pairs of an unknown column and the sensor or command that it nearly matches.
     pub misspelt: Vec<(String, String)>,
-    /// Columns of sensors in which every reading is missing.
+    /// Columns of sensors without any reading.
     pub empty: Vec<String>,
-    /// Sensors without a column that have no name in the model, by the names that they get: `sensor` and their number.
+    /// Sensors without a column and without a name in the model, by their default names.
+    ///
+    /// The default name is `sensor` and the sensor's number.
     pub nameless: Vec<String>,
-    /// Unit of the stamps where it is not the second.
+    /// Unit of the stamps, if it is not the second.
     pub time_unit: Option<&'static str>,
     /// Rows left out because another has the same stamp.
     pub doubled: usize,
-    /// Rows that were put in order.
+    /// Rows that were sorted.
     pub reordered: usize,
-    /// Commands that were missing, and held from the row before.
+    /// Missing commands, filled in from the row before.
     pub held: usize,
-    /// What a reader of another stack's files says: streams that could not be read, clocks that disagree.
+    /// Remarks of readers of other stacks' files: unreadable streams, disagreeing clocks.
     pub remarks: Vec<String>,
 }
 
 impl LogNotes {
-    /// One sentence for each.
+    /// The notes as lines, one sentence each.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut all = Vec::new();
@@ -69,8 +71,10 @@ impl LogNotes {
         all
     }
 
-    /// Whether a reading may have been lost: a column that looks like a sensor's, one of a sensor that is empty, or one that nobody knows where
-    /// a sensor has no name.
+    /// Whether a sensor's readings may be missing by mistake.
+    ///
+    /// A column nearly matches a sensor, a sensor's column is empty, or an unknown column may
+    /// belong to a sensor without a name.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
         let unnamed = !self.nameless.is_empty() && !self.passed_over.is_empty();

@@ -1,4 +1,4 @@
-//! Logs as Parquet files: flat columns of numbers, null or NaN where a reading is missing.
+//! Logs as Parquet files: flat columns of numbers, with null or NaN for a missing reading.
 
 mod file;
 mod layouts;
@@ -45,7 +45,7 @@ fn read_rows(
     reader.finish()
 }
 
-/// The number in a cell; NaN where there is none.
+/// The number in a cell; NaN where it is null.
 fn number(field: &Field) -> Result<f64, String> {
     let x = match *field {
         Field::Null => f64::NAN,
@@ -140,7 +140,7 @@ mod tests {
         );
     }
 
-    /// What is told of a log whose first page has another head.
+    /// The error for a log whose first page has another header.
     fn told_of_page(head: &[u8]) -> String {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.parquet");
@@ -155,7 +155,9 @@ mod tests {
         error
     }
 
-    /// The head of the first page states a field of 2^31 - 1 booleans, which `parquet` would skip one by one.
+    /// The header of the first page states a field of 2^31 - 1 booleans.
+    ///
+    /// `parquet` would skip them one by one.
     #[test]
     fn a_page_that_states_more_than_there_is_is_refused_at_once() {
         // Field 9, a list; its elements, booleans; their count.
@@ -164,10 +166,12 @@ mod tests {
         assert!(error.contains(want), "{error}");
     }
 
-    /// The head of the first page states 2^31 - 1 bytes, which `parquet` would take from memory before it unpacks them.
+    /// The header of the first page states 2^31 - 1 bytes.
+    ///
+    /// `parquet` would allocate them before it decompresses.
     #[test]
     fn a_page_that_asks_for_two_gigabytes_is_refused() {
-        // Field 1, the kind of the page; field 2, its length with the sign in the last place; the end.
+        // Field 1, the kind of the page; field 2, its length in zigzag encoding; the end.
         let error = told_of_page(&[0x15, 0x00, 0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f, 0x00]);
         let want = "the page at byte 4 is damaged: it states 2147483647 bytes";
         assert!(error.contains(want), "{error}");

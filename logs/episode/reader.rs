@@ -1,4 +1,4 @@
-//! From rows of cells to an episode: which column holds what, and what is mended.
+//! Builds an episode from rows of cells: finds the columns, and repairs common faults.
 
 use asid_core::episode::{ChannelColumns, Episode, InitialState};
 use asid_core::layout::Layout;
@@ -8,7 +8,7 @@ use super::mapping::{ColumnMapping, Source};
 use super::notes::LogNotes;
 use super::{clock, delay};
 
-/// A column of the log, and how a quantity is read from it.
+/// A column of the log, and the conversion of its numbers to a quantity.
 #[derive(Clone, Copy, Debug)]
 struct Column {
     place: usize,
@@ -17,24 +17,24 @@ struct Column {
     delay: f64,
 }
 
-/// A log that is being read, row by row.
+/// A log while it is read, row by row.
 pub(super) struct Reader<'a> {
     layout: &'a Layout,
     header: Vec<String>,
     time: usize,
-    /// Factor of the stamps, where the study states their unit.
+    /// Factor of the stamps to seconds, if the study states their unit.
     pub(super) time_factor: Option<f64>,
     ctrl: Vec<Column>,
     readings: Vec<Column>,
-    /// Column, whether it is a velocity, and its place in `qpos` or `qvel`.
+    /// Column, whether it is a velocity, and its index in `qpos` or `qvel`.
     state: Vec<(usize, bool, usize)>,
-    /// Number of each row, as messages have it.
+    /// Number of each row in messages.
     numbers: Vec<usize>,
     episode: Episode,
     notes: LogNotes,
 }
 
-/// The columns that are passed over, and the sensors whose names they nearly are.
+/// Notes of the skipped columns, and of sensors whose names they nearly match.
 fn noted(layout: &Layout, channels: &[ChannelColumns], passed_over: Vec<String>) -> LogNotes {
     let mut notes = LogNotes {
         passed_over,
@@ -62,7 +62,7 @@ fn noted(layout: &Layout, channels: &[ChannelColumns], passed_over: Vec<String>)
 }
 
 impl<'a> Reader<'a> {
-    /// Finds what each column holds.
+    /// Finds the columns of all quantities.
     pub(super) fn new(
         layout: &'a Layout,
         mappings: &[ColumnMapping],
@@ -150,8 +150,9 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Takes the next row, which messages call by its number. `cell` gives the number in a column, NaN where it is empty, or else
-    /// what stands there.
+    /// Adds the next row, which messages name by its number.
+    ///
+    /// `cell` returns the number in a column, NaN where it is empty, and the cell's text as error.
     pub(super) fn row(
         &mut self,
         row: usize,
@@ -197,7 +198,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The episode: stamps in seconds, rows in order, commands held, late columns moved.
+    /// Completes the episode: stamps in seconds, sorted rows, held commands, shifted late columns.
     pub(super) fn finish(mut self) -> Result<(Episode, LogNotes), String> {
         let episode = &mut self.episode;
         clock::to_seconds(&mut episode.time, self.time_factor, &mut self.notes);
@@ -246,7 +247,10 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Holds the commands of one actuator where they are missing, before the first as it; how many were, `None` where all are.
+/// Fills in the missing commands of one actuator, and returns their number; `None` if all are
+/// missing.
+///
+/// Each takes the command before it, or the first one where there is none.
 fn hold(ctrl: &mut [f64], nu: usize, actuator: usize) -> Option<usize> {
     let column = || (actuator..ctrl.len()).step_by(nu);
     let mut last = ctrl[column().find(|&i| ctrl[i].is_finite())?];
@@ -262,14 +266,14 @@ fn hold(ctrl: &mut [f64], nu: usize, actuator: usize) -> Option<usize> {
     Some(held)
 }
 
-/// A column that is nearly this one, in words.
+/// The column with the most similar name, as a question for a message.
 fn near_column(header: &[String], name: &str) -> String {
     let near = Error::nearest(name, header.iter().map(|h| &**h));
     near.map_or_else(String::new, |near| format!("; is it `{near}`?"))
 }
 
-/// Columns of the state at the first row: column, whether it is a velocity, and its place in
-/// `qpos` or `qvel`.
+/// Columns of the initial state: column, whether it is a velocity, and its index in `qpos` or
+/// `qvel`.
 fn state_columns(layout: &Layout, header: &[String]) -> Vec<(usize, bool, usize)> {
     let columns = header.iter().enumerate();
     let of = |(i, name): (usize, &String)| {
@@ -279,14 +283,18 @@ fn state_columns(layout: &Layout, header: &[String]) -> Vec<(usize, bool, usize)
     columns.filter_map(of).collect()
 }
 
-/// Whether a column of this name holds a coordinate of the state at the first row: `qpos.<joint>` or `qvel.<joint>`, with `.i` where a joint
-/// has several.
+/// Whether a column of this name holds a coordinate of the initial state.
+///
+/// The names are `qpos.<joint>` and `qvel.<joint>`, with `.i` where a joint has several
+/// coordinates.
 #[must_use]
 pub fn is_of_start(layout: &Layout, name: &str) -> bool {
     state_place(layout, name).is_some()
 }
 
-/// Whether a coordinate of the state is a velocity, and its place in `qpos` or `qvel`; `None` of a column that is none.
+/// Whether a coordinate of the state is a velocity, and its index in `qpos` or `qvel`.
+///
+/// `None` for any other column.
 fn state_place(layout: &Layout, name: &str) -> Option<(bool, usize)> {
     let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
         (Some(rest), _) => (rest, false),

@@ -1,4 +1,4 @@
-//! A log as another wiring of its columns would have given it.
+//! Applies other mappings of the columns to a log that was already read.
 
 use asid_core::layout::Layout;
 use asid_core::{Episode, Result};
@@ -6,11 +6,13 @@ use asid_core::{Episode, Result};
 use super::mapping::{ColumnMapping, Source};
 use super::{delay, entry_name};
 
-/// The same log as another wiring of its columns would have given it: factor, offset and delay of the mappings
-/// are applied to the quantities as they were read, and `from` names the quantity that a column holds.
+/// The log with other mappings of its columns.
+///
+/// Factor, offset and delay of the mappings apply to the quantities as they were read, and `from`
+/// names the quantity that a column holds.
 ///
 /// # Errors
-/// When a mapping names what the scene does not have.
+/// When a mapping names something that the scene does not have.
 pub fn remapped(episode: &Episode, layout: &Layout, mappings: &[ColumnMapping]) -> Result<Episode> {
     mappings.iter().try_for_each(|m| m.check(layout))?;
     let mut out = episode.clone();

@@ -1,7 +1,7 @@
-//! Logs that another reader has brought into columns: recordings of other stacks.
+//! Logs that another reader has converted to columns: recordings of other stacks.
 //!
-//! Streams of their own rates make a table whose rows are all their stamps, with a missing reading wherever a stream says
-//! nothing at a stamp. From there on such a log is read as a CSV file is.
+//! Streams with different rates become one table (see [`crate::align`]), with NaN where a row has
+//! no reading. Such a log is then read like a CSV file.
 
 use std::path::Path;
 
@@ -15,14 +15,15 @@ use super::{ColumnMapping, LogNotes, entry_name};
 /// Columns of numbers over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// Stamps, s; one a row.
+    /// Stamps, s; one for each row.
     pub time: Vec<f64>,
     /// Name and values of each column, as long as `time`; NaN where there is no value.
     pub columns: Vec<(String, Vec<f64>)>,
 }
 
-/// Names of the columns that a log of a scene with this layout is read from, under some mappings: those of the commands, and those
-/// of the readings. The columns of a start (`qpos.*`, `qvel.*`) are not among them.
+/// Names of the columns of the commands and of the readings, under some mappings.
+///
+/// The columns of an initial state (`qpos.*`, `qvel.*`) are not included.
 #[must_use]
 pub fn wanted(layout: &Layout, mappings: &[ColumnMapping]) -> [Vec<String>; 2] {
     let commands = layout.actuators.iter();
@@ -34,7 +35,7 @@ pub fn wanted(layout: &Layout, mappings: &[ColumnMapping]) -> [Vec<String>; 2] {
     [commands.collect(), readings.collect()]
 }
 
-/// Names of what a log of a scene with this layout may hold: the commands, and every entry of every sensor.
+/// Names of all quantities that a log may hold: the commands, and every entry of every sensor.
 #[must_use]
 pub fn quantities(layout: &Layout) -> Vec<String> {
     let commands = layout.actuators.iter().map(|a| format!("ctrl.{}", a.name));
@@ -43,7 +44,7 @@ pub fn quantities(layout: &Layout) -> Vec<String> {
     commands.chain(entries).collect()
 }
 
-/// Reads a table as a log of a scene with this layout, as [`super::read`] does a file; `path` is what errors name.
+/// Reads a table as [`super::read`] reads a file; errors name `path`.
 ///
 /// # Errors
 /// When a row, a column or a mapping is wrong; the message names it.
@@ -58,7 +59,7 @@ pub fn of_table(
         let names = table.columns.iter().map(|(name, _)| name.clone());
         let header = std::iter::once("time".to_owned()).chain(names).collect();
         let mut reader = Reader::new(layout, mappings, header)?;
-        // The stamps are in seconds already.
+        // The stamps are already in seconds.
         reader.time_factor = Some(1.0);
         for (row, time) in table.time.iter().enumerate() {
             reader.row(row + 2, |column| {

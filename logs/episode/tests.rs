@@ -1,11 +1,11 @@
-//! A log of another stack, with the mapping that mends it, is the log as the model has it.
+//! A log of another stack with the right mapping equals the log in the model's terms.
 
 use asid_core::episode::ChannelColumns;
 use asid_core::layout::{Actuator, Sensor};
 
 use super::*;
 
-/// A servo with its angle and the place of its tip.
+/// A servo with its angle and the position of its tip.
 pub(super) fn layout() -> Layout {
     Layout {
         timestep: 0.01,
@@ -43,7 +43,7 @@ fn read_text(text: &str, mappings: &[ColumnMapping]) -> Result<(Episode, LogNote
     read_mapped(&path, &layout(), mappings)
 }
 
-/// A log at 100 Hz: the angle is a cubic of time, the tip runs on lines.
+/// A log at 100 Hz: the angle is a cubic of time, the tip moves linearly.
 fn plain(late: f64) -> Vec<[f64; 6]> {
     (0..60)
         .map(|k| {
@@ -84,8 +84,8 @@ fn assert_same(a: &Episode, b: &Episode) {
 #[test]
 fn a_spoilt_log_with_its_mending_gives_the_same_readings() {
     let (want, _) = read_text(&text(PLAIN, &plain(0.0)), &[]).unwrap();
-    // Stamps in ms, the command in degrees, the angle in degrees with the wrong sign and another zero, the tip in mm with
-    // two axes swapped.
+    // Stamps in ms, the command in degrees, the angle in degrees with the wrong sign and another
+    // zero, the tip in mm with two axes swapped.
     let spoilt: Vec<[f64; 6]> = plain(0.0)
         .into_iter()
         .map(|[t, u, angle, x, y, z]| {
@@ -124,7 +124,7 @@ fn readings_that_are_late_are_given_to_the_time_that_they_tell_of() {
         ..ColumnMapping::of(name)
     });
     let (got, _) = read_text(&text(PLAIN, &plain(0.034)), &mappings).unwrap();
-    // What the last rows would have told came after the log's end.
+    // Readings of the last rows arrive after the log's end.
     let told = 60 - 4;
     let width = want.width();
     for (x, y) in got.readings[..told * width].iter().zip(&want.readings) {
@@ -348,7 +348,7 @@ fn a_column_that_stands_twice_is_refused_by_name() {
         "{said}"
     );
     assert!(said.contains("column 3 and as column 4"), "{said}");
-    // The empty name of an index, and of cells behind the last comma.
+    // Empty names: of an index, and of cells after the last comma.
     let read = read_text(",time,ctrl.servo,angle,\n0,0,0,1,\n1,0.1,0,2,\n", &[]);
     assert!(read.is_ok(), "{read:?}");
 }

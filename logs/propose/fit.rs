@@ -1,15 +1,17 @@
-//! What two series say of each other: a command and the position that follows it, a speed and the displacement that it makes.
+//! Compares two series: a command with the position that follows it, a speed with displacements.
 
 use crate::series::Series;
 
-/// Times at which two series are compared.
+/// Number of times at which two series are compared.
 const SAMPLES: usize = 400;
-/// Windows over which displacements are compared with speeds: some tenths of a second in usual logs.
+/// Number of windows over which displacements are compared with speeds.
+///
+/// A window has some tenths of a second in usual logs.
 const WINDOWS: usize = 120;
-/// Fewest common samples that say anything.
+/// Fewest common samples for a comparison.
 const FEWEST: usize = 12;
 
-/// The value of a series at a time, on the line between its neighbours; `None` outside of it.
+/// The value of a series at a time, interpolated linearly; `None` outside its time.
 #[must_use]
 pub fn at(series: &Series, time: f64) -> Option<f64> {
     let after = series.time.partition_point(|t| *t < time);
@@ -23,7 +25,7 @@ pub fn at(series: &Series, time: f64) -> Option<f64> {
     Some(x + along * (y - x))
 }
 
-/// Times that two series share, evenly spread.
+/// Evenly spread times within the common time of two series.
 fn shared(a: &Series, b: &Series, count: usize) -> Vec<f64> {
     let ends = |s: &Series| Some((*s.time.first()?, *s.time.last()?));
     let (Some((a0, a1)), Some((b0, b1))) = (ends(a), ends(b)) else {
@@ -37,7 +39,7 @@ fn shared(a: &Series, b: &Series, count: usize) -> Vec<f64> {
     (0..count).map(|k| first + k as f64 * step).collect()
 }
 
-/// Correlation of two series over the time that they share, -1 to 1; 0 where one of them stands still.
+/// Correlation of two series over their common time, -1 to 1; 0 where one of them is constant.
 #[must_use]
 pub fn correlation(a: &Series, b: &Series) -> f64 {
     let pairs = shared(a, b, SAMPLES);
@@ -68,8 +70,10 @@ fn of_pairs(pairs: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// Factor that turns a speed into the speed of a position, and how surely (correlation of displacements, -1 to 1). The
-/// displacements of the position in short windows are compared with the integral of the speed, which noise hardly touches.
+/// Factor from a speed to the rate of a position, and the correlation of displacements, -1 to 1.
+///
+/// It compares the displacements of the position in short windows with the integral of the speed,
+/// which noise hardly affects.
 #[must_use]
 pub fn speed_factor(speed: &Series, position: &Series) -> Option<(f64, f64)> {
     let ends = shared(speed, position, WINDOWS + 1);
@@ -87,7 +91,7 @@ pub fn speed_factor(speed: &Series, position: &Series) -> Option<(f64, f64)> {
     (xx > 0.0 && displacements.len() >= FEWEST).then(|| (xy / xx, sure))
 }
 
-/// Integral of a series between two times, by trapezoids at its own samples.
+/// Integral of a series between two times, by the trapezoidal rule at its own samples.
 fn integral(series: &Series, from: f64, to: f64) -> Option<f64> {
     let (mut t, mut x, mut sum) = (from, at(series, from)?, 0.0);
     let inside =

@@ -1,4 +1,4 @@
-//! What a model's machine reads and takes: the quantities that columns are sought for.
+//! Quantities of a model's machine that a log may hold: readings and commands.
 
 use asid_core::Scene;
 use asid_core::layout::{JointKind, Sensor};
@@ -8,7 +8,7 @@ use asid_mjcf::plant::{DriveLaw, Reads};
 use super::words::{Measure, Words};
 use crate::counted::counted;
 
-/// What a number of a quantity counts.
+/// Dimension of a quantity, without time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// rad, or rad/s and rad/s².
@@ -22,31 +22,31 @@ pub enum Dimension {
 /// A command, or an entry of a sensor.
 #[derive(Clone, Debug)]
 pub struct Quantity {
-    /// Name as a study has it: `ctrl.elbow`, `angle`, `tip.0`.
+    /// Name in a study: `ctrl.elbow`, `angle`, `tip.0`.
     pub name: String,
-    /// Name of the whole sensor, of an entry of a vector.
+    /// Name of the whole sensor, for an entry of a vector.
     pub vector: Option<String>,
-    /// Whether it is sent.
+    /// Whether it is a command.
     pub command: bool,
-    /// Its place among the commands, or that of its joint among the joints.
+    /// Its index among the commands, or that of its joint among the joints.
     pub place: Option<usize>,
     /// Index of its joint in the layout.
     pub joint: Option<usize>,
-    /// What it measures; of a command, what it asks for.
+    /// What it measures; for a command, what it asks for.
     pub measure: Option<Measure>,
-    /// What its numbers count.
+    /// Its dimension, without time.
     pub dimension: Dimension,
-    /// The same with its time, in words: what the unit of a column must count as well; `None` where that is not known.
+    /// Kind of quantity, in words, that its unit must measure; `None` where unknown.
     pub counts: Option<&'static str>,
-    /// Values that it can take, in SI units, where the model says.
+    /// Possible values in SI units, if the model states them.
     pub range: Option<[f64; 2]>,
-    /// Its name and that of its joint or body, in words.
+    /// Words of its name, and of its joint's or body's.
     pub words: Vec<Words>,
-    /// Axis of an entry of a vector.
+    /// Axis, for an entry of a vector.
     pub axis: Option<char>,
 }
 
-/// Everything that a log of a machine may hold.
+/// All quantities that a log of a machine may hold.
 ///
 /// # Errors
 /// When the document is not valid MJCF.

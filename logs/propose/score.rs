@@ -1,4 +1,4 @@
-//! Points of a quantity and a column, and the choice by them.
+//! Scores pairs of a quantity and a column, and matches them by score.
 
 use std::collections::HashMap;
 
@@ -10,58 +10,60 @@ use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;
 
-/// Points of a name that is the quantity's own: above all else together.
+/// Points of a name that equals the quantity's: more than all others together.
 const OWN_NAME: f64 = 100.0;
-/// Points where all telling words are shared; less in proportion.
+/// Points where all own words of the two names are shared; in proportion for fewer.
 const SAME_WORDS: f64 = 4.0;
-/// Part of them where the words are in the topic's name only.
+/// Factor of [`SAME_WORDS`] where only the topic's name has the words.
 const BY_TOPIC: f64 = 0.8;
-/// Points of a word that is the joint's or actuator's whole name, such as `x`: more than a place in a list has, for a name is a
-/// better ground.
+/// Points of a word that is the joint's or actuator's whole name, such as `x`.
+///
+/// They exceed those of a place in a list, since a name is better evidence.
 const WHOLE_NAME: f64 = 2.0;
-/// Further points of it where the column has no other telling word; less in proportion. Both together stay below shared telling words:
-/// a letter is in more names than a word.
+/// Further points of a whole name where the column has no other own word; in proportion otherwise.
+///
+/// Both together stay below shared own words, since more names have a letter than a word.
 const NO_OTHER: f64 = 1.5;
-/// Points lost where both have words, and none in common.
+/// Points lost where both names have own words, but none in common.
 const OTHER_WORDS: f64 = 1.5;
 /// Points of the same measure.
 const SAME_MEASURE: f64 = 2.0;
-/// Points lost by another measure: a speed is no place, whatever its name.
+/// Points lost by another measure: a speed is not a position, whatever its name.
 const OTHER_MEASURE: f64 = 4.0;
-/// Points of being named as sent, for a command, or as read, for a reading.
+/// Points of a name that says sent, for a command, or read, for a reading.
 const SAME_ROLE: f64 = 1.0;
-/// Points lost by the contrary.
+/// Points lost by a name that says the opposite.
 const OTHER_ROLE: f64 = 4.0;
 /// Points of the same place in a list.
 const SAME_PLACE: f64 = 1.5;
-/// Points lost by values that no unit brings into the range.
+/// Points lost by values that no unit brings into the model's range.
 const OUT_OF_RANGE: f64 = 1.0;
-/// Points of a command that is just as what follows it.
+/// Points of a command that correlates perfectly with the position that follows it.
 const LOOKS_LIKE: f64 = 1.5;
-/// Fewest points of a pair that is proposed: one strong ground, or two weak ones.
+/// Fewest points of a proposed pair: one strong reason, or two weak ones.
 const FEWEST: f64 = 2.0;
 
-/// A column that may be a quantity.
+/// A column that may hold a quantity.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
     /// Index in [`RawLog::series`].
     pub series: usize,
-    /// How its numbers are read.
+    /// How its numbers are converted.
     pub unit: Unit,
-    /// Why it is the one.
+    /// Reasons for the match.
     pub reasons: Vec<String>,
     points: f64,
 }
 
-/// A column's name in words: without its topic, and with it.
+/// A column's name split into words, without and with its topic.
 struct Named {
     leaf: Words,
     full: Words,
-    /// Its number among the columns that are named alike up to the number, from 0.
+    /// Its place, from 0, among the columns whose names differ only in their final number.
     place: Option<usize>,
 }
 
-/// A log's columns in words.
+/// The columns of a log, with their names as words.
 pub(super) struct Context<'a> {
     log: &'a RawLog,
     quantities: &'a [Quantity],
@@ -102,7 +104,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// A pair that somebody knows of.
+    /// A pair that the user gives.
     pub(super) fn given(&self, quantity: usize, series: usize) -> Candidate {
         let words = &self.named[series].leaf;
         let unit = unit(
@@ -119,7 +121,9 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Gives columns to the commands or the readings, the best pair first; `more` are further points, -1 to 1.
+    /// Assigns columns to the commands or to the readings, the best pair first.
+    ///
+    /// `more` returns further evidence, -1 to 1.
     pub(super) fn assign(
         &self,
         taken: &mut [Option<Candidate>],
@@ -147,7 +151,7 @@ impl<'a> Context<'a> {
                 }
             }
         }
-        // A stable order: of equal points the earlier quantity, then the earlier column.
+        // A stable sort: of equal points the earlier quantity wins, then the earlier column.
         pairs.sort_by(|(_, a), (_, b)| b.points.total_cmp(&a.points));
         for (i, candidate) in pairs {
             let free = !taken.iter().flatten().any(|c| c.series == candidate.series);
@@ -157,7 +161,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Gives up vectors of which entries are missing: they are read whole or not at all.
+    /// Drops vectors with missing entries: they are read completely or not at all.
     pub(super) fn drop_incomplete(&self, taken: &mut [Option<Candidate>]) {
         for i in 0..taken.len() {
             let vector = &self.quantities[i].vector;
@@ -172,7 +176,7 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The pair of a quantity and a column; `None` where something excludes it.
+    /// The candidate of a quantity and a column; `None` where they cannot match.
     fn candidate(&self, quantity: &Quantity, place: usize) -> Option<Candidate> {
         let (series, named) = (&self.log.series[place], &self.named[place]);
         let unit = unit(quantity, series, &named.leaf, self.kind);
@@ -185,7 +189,7 @@ impl<'a> Context<'a> {
         if series.name == quantity.name {
             return Some(made(OWN_NAME, vec!["its name".into()], unit));
         }
-        // Millimetres are no angle, whatever the column is called.
+        // Millimetres are not an angle, whatever the column's name.
         if unit.name.is_some_and(|u| !allows(quantity.counts, u)) {
             return None;
         }
@@ -202,7 +206,7 @@ impl<'a> Context<'a> {
             }
             points += 1.0;
         } else if let Some(axis) = named.full.axis {
-            // An axis tells entries of a vector, and joints that are named after theirs: `x`, `slide_x`.
+            // An axis names an entry of a vector, or a joint named after its axis: `x`, `slide_x`.
             if !quantity.words.iter().any(|w| w.axis == Some(axis)) {
                 return None;
             }
@@ -241,7 +245,7 @@ impl<'a> Context<'a> {
             points += SAME_PLACE;
             reasons.push("by its place in a list".into());
         }
-        // Without a word or a place in common there may be but one such quantity.
+        // Without a shared word or place, only a quantity that is unique of its kind matches.
         let only = wordless && self.is_only(quantity);
         if !alike && !ordered {
             if !only {
@@ -256,7 +260,7 @@ impl<'a> Context<'a> {
         Some(made(points, reasons, unit))
     }
 
-    /// Whether the machine has no other quantity of the kind.
+    /// Whether the machine has no other quantity of this kind.
     fn is_only(&self, quantity: &Quantity) -> bool {
         let same = |q: &&Quantity| {
             let kind = (q.command, q.measure, q.dimension, q.axis);
@@ -271,7 +275,9 @@ impl<'a> Context<'a> {
     }
 }
 
-/// How much of a column's name is the whole name of a quantity, its joint or its actuator: 0 nothing, 1 all that tells it from others.
+/// Share of a column's own words that is the whole name of a quantity, its joint or its actuator.
+///
+/// 0 for none, 1 where it is the only own word.
 fn whole_name(quantity: &Quantity, named: &Named) -> f64 {
     let names = quantity.words.iter().filter_map(Words::whole);
     let parts = names.map(|name| {
@@ -281,7 +287,7 @@ fn whole_name(quantity: &Quantity, named: &Named) -> f64 {
     parts.fold(0.0, f64::max)
 }
 
-/// Points of being sent or read.
+/// Points of names that say sent or read.
 fn role(quantity: &Quantity, words: &Words) -> f64 {
     match (quantity.command, words.command, words.reading) {
         (true, true, _) | (false, _, true) => SAME_ROLE,
@@ -291,12 +297,13 @@ fn role(quantity: &Quantity, words: &Words) -> f64 {
     }
 }
 
-/// Points of what is measured. A column that says nothing of it holds positions.
+/// Points of the measure. A column whose name says none counts as a position.
 fn measure(quantity: &Quantity, named: &Named) -> f64 {
     let said = named.leaf.measure.or(named.full.measure);
     match (quantity.measure, said) {
         (Some(own), Some(said)) if own == said => SAME_MEASURE,
-        // A controller's name says what it controls, and a command may be in another quantity than the drive's.
+        // A controller is named after what it controls; its command may be of another measure than
+        // the drive's.
         (Some(_), Some(_)) if quantity.command => -0.5 * OTHER_MEASURE,
         (Some(_), Some(_)) => -OTHER_MEASURE,
         (Some(Measure::Position), None) => 0.5 * SAME_MEASURE,

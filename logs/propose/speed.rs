@@ -1,8 +1,9 @@
-//! The unit and the sign of a speed, by its position.
+//! The unit and the sign of a speed, from its position.
 //!
-//! The range of a joint says nothing of its speed. What the speed adds up to over a short time does: that is the
-//! displacement of the position, in the position's unit. Once the positions are placed, the factor between the two
-//! names the unit of a speed whose name does not, and its sign.
+//! A joint's range does not determine the unit of its speed. The integral of the speed over a short
+//! time does: it is the displacement of the position, in the position's unit. Once the positions
+//! are assigned, the factor between the two determines the sign of a speed, and its unit if its
+//! name has none.
 
 use super::quantity::Dimension;
 use super::{Match, fit, source, values};
@@ -10,12 +11,14 @@ use crate::episode::unit_factor;
 use crate::raw::RawLog;
 use crate::series::Series;
 
-/// Correlation of displacements above which a speed is sure to belong to a position.
+/// Smallest correlation of displacements for a speed to belong to a position.
 const SURE: f64 = 0.8;
-/// A unit explains the factor between a speed and its position where it is within this of it, as a logarithm: 35 %.
+/// Largest difference of logarithms of the found factor and a unit's: 0.3 is 35 %.
 const NEAR: f64 = 0.3;
 
-/// Unit and sign of a speed, by the displacements of its position; `own` is the position's series and factor.
+/// Sets unit and sign of a speed from the displacements of its position.
+///
+/// `own` is the position's series and factor.
 pub fn match_speed(found: &mut Match, log: &RawLog, own: (&Series, f64), dimension: Dimension) {
     let Some(mapping) = &mut found.mapping else {
         return;

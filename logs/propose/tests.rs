@@ -1,4 +1,4 @@
-//! Columns of other stacks find their quantities.
+//! Columns of other stacks match their quantities.
 
 use super::*;
 
@@ -14,7 +14,7 @@ const ARM: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
     <jointvel name="dq_pan" joint="shoulder_pan"/><jointvel name="dq_elbow" joint="elbow"/>
     <framepos name="puck_pos" objtype="body" objname="puck"/><framequat name="puck_quat" objtype="body" objname="puck"/></sensor></mujoco>"#;
 
-/// A joint's motion, rad: each another sine.
+/// A joint's motion, rad: each joint has another sine.
 fn motion(joint: usize, t: f64) -> f64 {
     let k = joint as f64;
     0.6 + 0.5 * ((2.0 + 0.7 * k) * t + k).sin()
@@ -196,7 +196,7 @@ fn a_unit_is_told_by_the_episode_that_moves_where_the_first_stands_still() {
         series,
         ..RawLog::default()
     };
-    // Up to a degree and a tenth may be anything; 63 is no angle in radians of a joint that ends at 1.6.
+    // Values up to 1.1 fit any unit; 63 is no angle in rad of a joint that ends at 1.6.
     let (still, moved) = (
         log(vec![column(1.0)]),
         log(vec![column(180.0 / std::f64::consts::PI)]),
@@ -215,7 +215,7 @@ fn a_unit_is_told_by_the_episode_that_moves_where_the_first_stands_still() {
     assert_eq!(unit(&whole).as_deref(), Some("deg"));
 }
 
-/// A cart with joints of one letter, as gantries have them.
+/// A cart with one-letter joints, as gantries have them.
 const GANTRY: &str = r#"<mujoco><worldbody>
   <body name="bridge"><joint name="x" type="slide" axis="1 0 0" range="-0.6 0.6"/><geom size="0.1" mass="1"/>
     <body name="cart"><joint name="y" type="slide" axis="0 1 0" range="-0.6 0.6"/><geom size="0.1" mass="1"/>

@@ -1,10 +1,10 @@
-//! The unit of a column. The first of these that says something decides:
+//! The unit of a column. The first of these that is conclusive decides:
 //!
 //! 1. its name, such as `elbow_deg`;
-//! 2. its stack: positions of LeRobot are degrees or shares of a range, and ROS writes SI;
+//! 2. its stack: positions of LeRobot are degrees or shares of a range, and ROS uses SI;
 //! 3. its values: the first usual unit in which a position lies within the range of the model.
 //!
-//! A speed without a named unit passes for SI here. Its position settles it later, in
+//! A speed without a named unit counts as SI here; later its position determines the unit, in
 //! [`match_speed`](super::speed::match_speed).
 
 use super::quantity::{Dimension, Quantity};
@@ -12,27 +12,27 @@ use super::words::{Measure, Words};
 use crate::format::LogFormat;
 use crate::series::Series;
 
-/// How far beyond a joint's range readings may lie, as a part of the range: stops give way, zeros are off.
+/// How far readings may lie beyond a joint's range, as a share of it: stops yield, zeros are off.
 const BEYOND: f64 = 0.15;
-/// The same in the unit of the joint, rad or m.
+/// How far readings may lie beyond any joint's range in addition, rad or m.
 const BEYOND_LEAST: f64 = 0.05;
-/// Largest angle that is taken for radians where the model states no range, rad: two turns.
+/// Largest angle that counts as radians where the model states no range, rad: two turns.
 const LARGEST_ANGLE: f64 = 12.6;
-/// Largest place that is taken for metres where the model states no range, m.
+/// Largest position that counts as metres where the model states no range, m.
 const LARGEST_PLACE: f64 = 20.0;
 
-/// How a column is brought to a quantity's unit.
+/// Conversion of a column to a quantity's unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unit {
     /// Unit as a study spells it; `None` for SI.
     pub name: Option<&'static str>,
-    /// Factor besides the unit.
+    /// Factor besides the unit's.
     pub scale: f64,
     /// Added after it.
     pub offset: f64,
-    /// How it is known, in a few words; empty for SI.
+    /// How the unit is known, in a few words; empty for SI.
     pub reason: String,
-    /// Whether the values allow it.
+    /// Whether the values fit.
     pub fits: bool,
 }
 
@@ -56,7 +56,7 @@ impl Unit {
     }
 }
 
-/// Share of a range, 0 to 100: what grippers of LeRobot count.
+/// Share of a range, 0 to 100, as LeRobot's grippers use.
 fn percent(range: [f64; 2], reason: &str) -> Unit {
     Unit {
         name: Some("%"),
@@ -67,7 +67,7 @@ fn percent(range: [f64; 2], reason: &str) -> Unit {
     }
 }
 
-/// The unit of a series that is to be a quantity.
+/// The unit of a series, if it holds a quantity.
 #[must_use]
 pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat) -> Unit {
     let per_second = |unit: &'static str| match (unit, quantity.measure) {
@@ -84,7 +84,7 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat
         };
     }
     let position = quantity.measure == Some(Measure::Position);
-    // A table may hold what LeRobot recorded, under its names.
+    // A table may hold LeRobot's data, under LeRobot's names.
     let features = ["action.", "observation.state."];
     let named_so =
         series.name.ends_with(".pos") && features.iter().any(|f| series.name.starts_with(f));
@@ -104,7 +104,7 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat
         Dimension::Length if position => &["m", "cm", "mm"],
         _ => return Unit::si(true),
     };
-    // What is written by the rules of ROS is in SI (REP 103), whatever the values are.
+    // Recordings of ROS are in SI by its rules (REP 103), whatever the values are.
     if matches!(kind, LogFormat::Mcap | LogFormat::Rosbag2) {
         return Unit::si(allows(quantity, series, 1.0));
     }
@@ -119,7 +119,7 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat
     }
 }
 
-/// Whether the values of a series, times a factor, can be those of a position.
+/// Whether the values of a series, times a factor, are possible positions.
 fn allows(quantity: &Quantity, series: &Series, factor: f64) -> bool {
     let fold = |start: f64, f: fn(f64, f64) -> f64| series.values.iter().copied().fold(start, f);
     let (low, high) = (

@@ -1,21 +1,21 @@
-//! Names in words: `ShoulderPan_pos [deg]` speaks of a shoulder's pan, of a position, and of degrees.
+//! Splits names into words: `ShoulderPan_pos [deg]` has a shoulder's pan, a position, and degrees.
 
-/// What a quantity is a measure of.
+/// The physical quantity that a name speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// Where something is.
+    /// A position.
     Position,
-    /// How something is turned, as a quaternion.
+    /// An orientation, as a quaternion.
     Orientation,
-    /// How fast it moves or turns.
+    /// A linear or angular velocity.
     Velocity,
-    /// How its speed changes.
+    /// An acceleration.
     Acceleration,
-    /// The force or torque on it.
+    /// A force or torque.
     Effort,
 }
 
-/// Words of a measure. `angular` and `linear` only say of which kind it is.
+/// Words of each measure. `angular` and `linear` only tell its kind.
 const MEASURES: [(Measure, &[&str]); 5] = [
     (
         Measure::Orientation,
@@ -74,7 +74,7 @@ const MEASURES: [(Measure, &[&str]); 5] = [
     ),
 ];
 
-/// Words of what is sent to a machine.
+/// Words for data sent to a machine.
 const COMMAND: [&str; 20] = [
     "command",
     "commands",
@@ -98,7 +98,7 @@ const COMMAND: [&str; 20] = [
     "input",
 ];
 
-/// Words of what is read from it.
+/// Words for data read from it.
 const READING: [&str; 11] = [
     "state",
     "states",
@@ -113,7 +113,7 @@ const READING: [&str; 11] = [
     "sensor",
 ];
 
-/// Words that tell one thing from no other.
+/// Words that do not distinguish one thing from another.
 const FILLER: [&str; 11] = [
     "joint",
     "joints",
@@ -128,7 +128,7 @@ const FILLER: [&str; 11] = [
     "msg",
 ];
 
-/// Units by how names spell them, as a study spells them.
+/// Spellings of units in names, and in a study.
 const UNITS: [(&str, &str); 14] = [
     ("deg", "deg"),
     ("degree", "deg"),
@@ -146,30 +146,30 @@ const UNITS: [(&str, &str); 14] = [
     ("meters", "m"),
 ];
 
-/// A name, taken apart.
+/// A name, split into words and classified.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Words {
     /// All words, in their order.
     pub all: Vec<String>,
-    /// What tells it from others of its kind.
+    /// Words that distinguish it from others of its kind.
     pub own: Vec<String>,
-    /// What it measures, where it says so.
+    /// Its measure, if it states one.
     pub measure: Option<Measure>,
-    /// Whether it speaks of a command.
+    /// Whether it says that it is a command.
     pub command: bool,
-    /// Whether it speaks of a reading.
+    /// Whether it says that it is a reading.
     pub reading: bool,
     /// Unit, as a study spells it.
     pub unit: Option<&'static str>,
     /// Axis: x, y, z or w.
     pub axis: Option<char>,
-    /// The number that it ends with.
+    /// The number at its end.
     pub index: Option<usize>,
-    /// Whether it speaks of turning, or else of moving along a line.
+    /// True for angular, false for linear, if it states either.
     pub turning: Option<bool>,
 }
 
-/// Lower-case words of a name: parted at signs, at capitals within, and between letters and digits.
+/// Lower-case words of a name, split at signs, at inner capitals, and between letters and digits.
 #[must_use]
 pub fn split(name: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
@@ -193,13 +193,13 @@ pub fn split(name: &str) -> Vec<String> {
 }
 
 impl Words {
-    /// Takes a name apart.
+    /// Splits and classifies a name.
     #[must_use]
     pub fn of(name: &str) -> Self {
         let words = split(name);
         let mut found = Self::default();
         let last = words.len().saturating_sub(1);
-        // An entry of a list is no name: `commands.data.2`, `position[2]`.
+        // The index of a list entry is not a name: `commands.data.2`, `position[2]`.
         let end = name.trim_end_matches(']');
         let stem = end.trim_end_matches(|c: char| c.is_ascii_digit());
         let entry = stem.len() < end.len() && stem.ends_with(['.', '[']);
@@ -207,14 +207,15 @@ impl Words {
             let measure = MEASURES.iter().find(|(_, all)| all.contains(&&**word));
             let unit = UNITS.iter().find(|(spelt, _)| spelt == word);
             if let Some((measure, _)) = measure {
-                // The last word of a measure is the nearest to the number: `pose.orientation`, `joint_states.velocity`.
+                // The last word of a measure counts: `pose.orientation`, `joint_states.velocity`.
                 let pose_of =
                     *measure == Measure::Position && found.measure == Some(Measure::Orientation);
                 if !pose_of {
                     found.measure = Some(*measure);
                 }
             } else if COMMAND.contains(&&**word) {
-                // The last word of a kind counts: the reference in a controller's state is a command.
+                // The last of these words counts: the reference in a controller's state is a
+                // command.
                 (found.command, found.reading) = (true, false);
             } else if READING.contains(&&**word) {
                 (found.command, found.reading) = (false, true);
@@ -235,8 +236,9 @@ impl Words {
         found
     }
 
-    /// The word that is the whole name, such as `x` of a gantry's joint; `None` of a name of several words, and of one that tells
-    /// nothing from another.
+    /// The single word of a one-word name, such as `x` of a gantry's joint.
+    ///
+    /// `None` for a name of several words, and for a word that distinguishes nothing.
     #[must_use]
     pub fn whole(&self) -> Option<&str> {
         match &*self.all {
@@ -245,7 +247,8 @@ impl Words {
         }
     }
 
-    /// Of the telling words and this one, the part that this one is: 1 where it stands alone, 0 where it is not among the words.
+    /// Share of `word` in the distinguishing words and itself: 1 if alone, 0 if it is not in the
+    /// name.
     #[must_use]
     pub fn part_of(&self, word: &str) -> f64 {
         if !self.all.iter().any(|w| w == word) {
@@ -255,7 +258,7 @@ impl Words {
         1.0 / (1 + others) as f64
     }
 
-    /// How alike the words of two names are that tell things apart: 1 all of them, 0 none (Jaccard's index).
+    /// Similarity of the distinguishing words of two names, 0 to 1 (Jaccard's index).
     #[must_use]
     pub fn likeness(&self, other: &Self) -> f64 {
         let mut all: Vec<&String> = self.own.iter().chain(&other.own).collect();

@@ -1,21 +1,24 @@
-//! Messages of ROS 2 as bytes: the common data representation (CDR) of the OMG, DDS-XTypes 1.3, section 7.4.
+//! Messages of ROS 2 in the common data representation (CDR): OMG DDS-XTypes 1.3, section 7.4.
 //!
-//! Four bytes say the byte order, then each number lies at a multiple of its size. Only what the definition says is read, and a
-//! length that a message states is believed only as far as the message goes: memory and time stay bounded by its bytes.
+//! Four bytes state the byte order, then each number is aligned to a multiple of its size. Only the
+//! definition determines what is read. A stated length is bounded by the end of the message, so
+//! that its bytes bound memory and time.
 
 use super::definition::{Count, Definition, Field, Kind, Primitive};
 
-/// Longest list of numbers that is kept: joints, poses and covariances are shorter; images, scans and clouds are longer.
+/// Longest list of numbers that is kept.
+///
+/// Joints, poses and covariances are shorter; images, scans and clouds are longer.
 const LONGEST_LIST: usize = 512;
 
 /// A decoded value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A number; whole numbers beyond 2^53 are rounded.
+    /// A number; integers beyond 2^53 are rounded.
     Number(f64),
     /// A text.
     Text(String),
-    /// Several of a kind.
+    /// A list of values.
     List(Vec<Value>),
     /// Named fields, in order.
     Record(Vec<(String, Value)>),
@@ -33,7 +36,7 @@ impl Value {
         }
     }
 
-    /// The number, where it is one.
+    /// The number, if it is one.
     #[must_use]
     pub fn number(&self) -> Option<f64> {
         match self {
@@ -51,7 +54,8 @@ pub fn decode(definition: &Definition, bytes: &[u8]) -> Result<Value, String> {
     let (head, body) = bytes
         .split_at_checked(4)
         .ok_or("a message is shorter than its header")?;
-    // Representation identifiers, table 60: plain CDR of version 1, and of version 2 where numbers of 8 bytes lie at multiples of 4.
+    // Representation identifiers, table 60: plain CDR of version 1, and of version 2, which aligns
+    // numbers of 8 bytes to multiples of 4.
     let (little, widest) = match (head[0], head[1]) {
         (0, 0) => (false, 8),
         (0, 1) => (true, 8),
@@ -77,7 +81,7 @@ struct Cursor<'a> {
     body: &'a [u8],
     at: usize,
     little: bool,
-    /// Largest multiple that a number lies at.
+    /// Largest alignment of a number.
     widest: usize,
 }
 
@@ -94,7 +98,7 @@ impl<'a> Cursor<'a> {
         Ok(taken)
     }
 
-    /// An unsigned number of `n` bytes, at most 8.
+    /// An unsigned integer of `n` bytes, at most 8.
     fn unsigned(&mut self, n: usize) -> Result<u64, String> {
         self.align(n);
         let little = self.little;
@@ -117,7 +121,7 @@ impl<'a> Cursor<'a> {
             Primitive::Bool => f64::from(u8::from(self.unsigned(1)? != 0)),
             Primitive::Unsigned(n) => self.unsigned(n)? as f64,
             Primitive::Signed(n) => {
-                // The sign bit is brought to the top and back.
+                // Shift the sign bit to the top and back.
                 let unused = 64 - 8 * n as u32;
                 let bits = self.unsigned(n)?;
                 ((bits << unused).cast_signed() >> unused) as f64
@@ -166,7 +170,7 @@ impl<'a> Cursor<'a> {
     }
 
     fn many(&mut self, definition: &Definition, kind: Kind, n: usize) -> Result<Value, String> {
-        // Every entry takes a byte at least.
+        // Every entry takes at least one byte.
         if n > self.body.len().saturating_sub(self.at) {
             return Err(format!("a message states {n} entries and ends before them"));
         }
@@ -194,7 +198,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Writes messages: what [`decode`] reads, little-endian, version 1.
+/// Writes messages that [`decode`] reads, little-endian, version 1.
 #[derive(Debug)]
 pub struct Encoder {
     bytes: Vec<u8>,
@@ -214,38 +218,38 @@ impl Encoder {
         self.bytes.resize(4 + body.next_multiple_of(size), 0);
     }
 
-    /// A number of 4 bytes.
+    /// Appends an unsigned integer of 4 bytes.
     pub fn u32(&mut self, x: u32) {
         self.align(4);
         self.bytes.extend(x.to_le_bytes());
     }
 
-    /// A signed number of 4 bytes.
+    /// Appends a signed integer of 4 bytes.
     pub fn i32(&mut self, x: i32) {
         self.align(4);
         self.bytes.extend(x.to_le_bytes());
     }
 
-    /// A number of 8 bytes.
+    /// Appends a float of 8 bytes.
     pub fn f64(&mut self, x: f64) {
         self.align(8);
         self.bytes.extend(x.to_le_bytes());
     }
 
-    /// A text.
+    /// Appends a text.
     pub fn text(&mut self, text: &str) {
         self.u32(u32::try_from(text.len() + 1).unwrap_or(u32::MAX));
         self.bytes.extend(text.as_bytes());
         self.bytes.push(0);
     }
 
-    /// A list of numbers, counted.
+    /// Appends a list of floats with its length.
     pub fn f64s(&mut self, xs: &[f64]) {
         self.u32(u32::try_from(xs.len()).unwrap_or(u32::MAX));
         xs.iter().for_each(|x| self.f64(*x));
     }
 
-    /// The message.
+    /// The encoded message.
     #[must_use]
     pub fn finish(self) -> Vec<u8> {
         self.bytes
@@ -284,7 +288,8 @@ mod tests {
         assert_eq!(value.field("name"), Some(&Value::List(names.into())));
     }
 
-    /// Bytes by hand: a byte, then a float at the next multiple of 8 (of 4 in version 2), in both orders.
+    /// Bytes by hand: a byte, then a float at the next multiple of 8 (of 4 in version 2), in both
+    /// orders.
     #[test]
     fn numbers_lie_at_multiples_of_their_size() {
         let definition = Definition::parse("p/T", "int8 a\nfloat64 b\nint16 c").unwrap();

@@ -1,21 +1,23 @@
-//! Message definitions of ROS 2, as recordings hold them: the text of a `.msg` file, and those of all that it names.
+//! Message definitions of ROS 2, as recordings hold them.
 //!
-//! A line of 80 `=` and a line `MSG: package/Type` lead to each further definition
-//! ([MCAP: ros2msg](https://mcap.dev/spec/registry#ros2msg)). Bags of Humble and before hold no definitions: those of the common
-//! messages are in `COMMON`.
+//! A definition is the text of a `.msg` file, followed by those of all types that it names. A line
+//! of 80 `=` and a line `MSG: package/Type` precede each further one ([MCAP:
+//! ros2msg](https://mcap.dev/spec/registry#ros2msg)). Bags of Humble and before hold no
+//! definitions: `COMMON` has those of the common messages.
 
 use std::collections::HashMap;
 
-/// Definitions of the messages that robots' logs are made of, without comments and defaults
-/// (common_interfaces, rcl_interfaces and control_msgs of ROS 2; Apache License 2.0).
+/// Definitions of the messages that robots usually log, without comments and defaults.
+///
+/// From common_interfaces, rcl_interfaces and control_msgs of ROS 2; Apache License 2.0.
 const COMMON: &str = include_str!("common.msg");
 
-/// Deepest nesting of records: those of ROS have six levels at most.
+/// Deepest nesting of records: those of ROS have at most six levels.
 const DEEPEST: usize = 24;
-/// Most records in one definition: the largest of ROS have some thirty.
+/// Most records in one definition: the largest of ROS have about thirty.
 const MOST_RECORDS: usize = 512;
 
-/// A number or text, as it lies in a message.
+/// A number or text, by its encoding in a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primitive {
     /// One byte, 0 or 1.
@@ -26,14 +28,14 @@ pub enum Primitive {
     Unsigned(usize),
     /// Floating-point number of this many bytes.
     Float(usize),
-    /// Length and UTF-8 with an end mark.
+    /// UTF-8 after its length, with a terminating zero.
     Text,
-    /// Length and UTF-16.
+    /// UTF-16 after its length.
     WideText,
 }
 
 impl Primitive {
-    /// Bytes of one, 1 or more; of a text its length's.
+    /// Size in bytes, at least 1; for a text, the size of its length.
     #[must_use]
     pub fn size(self) -> usize {
         match self {
@@ -44,7 +46,7 @@ impl Primitive {
     }
 
     fn named(name: &str) -> Option<Self> {
-        // Bounds of texts (`string<=10`) say nothing of how they lie in a message.
+        // Bounds of texts (`string<=10`) do not change the encoding.
         let name = name.split("<=").next().unwrap_or(name);
         Some(match name {
             "bool" => Self::Bool,
@@ -65,7 +67,7 @@ impl Primitive {
     }
 }
 
-/// What a field holds.
+/// Type of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A number or text.
@@ -74,14 +76,14 @@ pub enum Kind {
     Record(usize),
 }
 
-/// How many of it.
+/// Number of values in a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count {
     /// One.
     One,
-    /// As many as the type says, at least 1.
+    /// A fixed number that the type states, at least 1.
     Fixed(usize),
-    /// As many as the message says.
+    /// A number that the message states.
     Counted,
 }
 
@@ -90,16 +92,16 @@ pub enum Count {
 pub struct Field {
     /// Name.
     pub name: String,
-    /// What it holds.
+    /// Its type.
     pub kind: Kind,
-    /// How many of it.
+    /// Its number of values.
     pub count: Count,
 }
 
-/// A message type with all that it is made of.
+/// A message type with all types that it contains.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Definition {
-    /// Fields of each record; the message itself is the first.
+    /// Fields of each record; the first record is the message itself.
     pub records: Vec<Vec<Field>>,
 }
 
@@ -107,8 +109,10 @@ pub struct Definition {
 type Written<'a> = Vec<(&'a str, &'a str)>;
 
 impl Definition {
-    /// Reads the definition of the message type `name` (`package/msg/Type`) from the text that a recording holds;
-    /// an empty text stands for the common definition of that name.
+    /// Parses the definition of the message type `name` (`package/msg/Type`) from a recording's
+    /// text.
+    ///
+    /// An empty text stands for the common definition of that name.
     ///
     /// # Errors
     /// When a type is not defined, or contains itself; the message names it.
@@ -133,7 +137,7 @@ impl Definition {
     }
 }
 
-/// `package/Type`, however it is written; a bare type is of `package`.
+/// The form `package/Type` of any spelling; a bare type belongs to `package`.
 fn canonical(name: &str, package: &str) -> String {
     let parts: Vec<&str> = name.split('/').collect();
     match parts[..] {
@@ -146,7 +150,7 @@ fn canonical(name: &str, package: &str) -> String {
     }
 }
 
-/// The definitions in a text, by canonical name; the first is of `root`.
+/// The definitions in a text, by canonical name; the first belongs to `root`.
 fn written<'a>(text: &'a str, root: &str) -> HashMap<String, Written<'a>> {
     let mut found = HashMap::new();
     let mut own = canonical(root, "");
@@ -165,7 +169,8 @@ fn written<'a>(text: &'a str, root: &str) -> HashMap<String, Written<'a>> {
         let (Some(kind), Some(name)) = (words.next(), words.next()) else {
             continue;
         };
-        // `TYPE NAME=VALUE` is a constant, in any spacing; what follows the name of a field is its default.
+        // `TYPE NAME=VALUE` is a constant, in any spacing; text after a field's name is its
+        // default.
         let constant = name.contains('=') || words.next().is_some_and(|w| w.starts_with('='));
         if !constant {
             fields.push((kind, name));
@@ -177,7 +182,7 @@ fn written<'a>(text: &'a str, root: &str) -> HashMap<String, Written<'a>> {
 
 struct Resolver<'a> {
     texts: &'a HashMap<String, Written<'a>>,
-    /// Index of each record that is read; `None` while its fields are.
+    /// Index of each record; `None` while its fields are being read.
     places: HashMap<String, Option<usize>>,
     definition: Definition,
 }
@@ -210,7 +215,7 @@ impl Resolver<'_> {
                 count,
             });
         }
-        // A record without fields takes a byte.
+        // A record without fields takes one byte.
         if self.definition.records[place].is_empty() {
             self.definition.records[place].push(Field {
                 name: "structure_needs_at_least_one_member".into(),
@@ -223,7 +228,7 @@ impl Resolver<'_> {
     }
 }
 
-/// A type without its brackets, and what they say.
+/// Splits a type into the type without brackets and the count in them.
 fn counted(kind: &str) -> Result<(&str, Count), String> {
     let Some((bare, rest)) = kind.split_once('[') else {
         return Ok((kind, Count::One));

@@ -1,30 +1,32 @@
 //! The messages of one topic as series of numbers.
 //!
-//! A number's name is the way to it: `/odom.twist.twist.linear.x`. Entries of a list are named by a list of names beside it
-//! (`name`, `joint_names`), records by a name of their own (`child_frame_id`), and by their place otherwise. Time stamps,
-//! covariances and the layouts of arrays are no readings.
+//! A number's name is its path: `/odom.twist.twist.linear.x`. A list of names beside it (`name`,
+//! `joint_names`) names the entries of a list. A name of its own (`child_frame_id`) names a record.
+//! Otherwise the index names an entry. Time stamps, covariances and the layouts of arrays are not
+//! readings.
 
 use std::collections::HashMap;
 
 use super::cdr::Value;
 use crate::series::Series;
 
-/// Most series of one topic; beyond it names change from message to message.
+/// Most series of one topic; with more, names change from message to message.
 const MOST_SERIES: usize = 2048;
-/// A topic's own stamps count where they are within this of the recorder's, s: nearer than that two clocks
-/// of one machine agree, and simulated time or time since boot is farther.
+/// Largest offset of a topic's own stamps from the recorder's for them to count, s.
+///
+/// Two clocks of one machine agree better; simulated time and time since boot are farther off.
 const SAME_CLOCK: f64 = 0.5;
 /// Nanoseconds in a second.
 const SECOND: f64 = 1e9;
 
-/// Names of lists that name the entries of the lists beside them.
+/// Names of lists that name the entries of their sibling lists.
 const NAMING: [&str; 4] = ["name", "names", "joint_names", "interface_names"];
-/// Names of texts that name the record that they are in.
+/// Fields whose text names the record that contains them.
 const OWN_NAME: [&str; 2] = ["child_frame_id", "name"];
-/// Fields that are no readings.
+/// Fields that are not readings.
 const NO_READING: [&str; 3] = ["header", "layout", "time_from_start"];
 
-/// When a message was recorded, and when it says that it was made; ns.
+/// Time of recording, and the message's own stamp; ns.
 #[derive(Clone, Copy, Debug)]
 struct Stamps {
     recorded: i64,
@@ -38,7 +40,7 @@ struct Sample {
     value: f64,
 }
 
-/// A topic that is being read.
+/// A topic while it is read.
 #[derive(Debug, Default)]
 pub struct Stream {
     names: Vec<String>,
@@ -48,7 +50,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// Takes a message that was recorded at a time, ns.
+    /// Adds a message that was recorded at a time, ns.
     pub fn push(&mut self, topic: &str, recorded: i64, message: &Value) {
         let own = message.field("header").and_then(|h| h.field("stamp"));
         let own = own.and_then(nanoseconds).filter(|t| *t != 0);
@@ -67,7 +69,9 @@ impl Stream {
         self.stamps.push(stamps);
     }
 
-    /// The points of a trajectory, each at its time; they replace what was planned for then and later.
+    /// Adds the points of a trajectory, each at its time.
+    ///
+    /// They replace what was planned for their time and later.
     fn trajectory(&mut self, path: &mut String, at: Stamps, points: &[Value], names: &Value) {
         if let Some(kept) = self.stamps.iter().position(|s| s.recorded >= at.recorded) {
             self.stamps.truncate(kept);
@@ -84,7 +88,7 @@ impl Stream {
         }
     }
 
-    /// Adds the numbers of a value; `names` are those of the entries of its lists.
+    /// Adds the numbers of a value; `names` are the names of its lists' entries.
     fn flatten(&mut self, path: &mut String, value: &Value, names: Option<&Value>) {
         match value {
             Value::Number(x) => self.sample(path, *x),
@@ -141,7 +145,7 @@ impl Stream {
         }
     }
 
-    /// Whether the messages' own stamps are on the recorder's clock; the remark where they are not.
+    /// Whether the messages' own stamps are on the recorder's clock; a remark if not.
     fn own_clock(&self, topic: &str) -> (bool, Option<String>) {
         let apart = |s: &Stamps| Some(s.own?.saturating_sub(s.recorded));
         let mut apart: Vec<i64> = self.stamps.iter().filter_map(apart).collect();
@@ -159,7 +163,7 @@ impl Stream {
         (false, Some(remark))
     }
 
-    /// First stamp that counts, ns.
+    /// Earliest of the stamps that count, ns.
     #[must_use]
     pub fn first(&self) -> Option<i64> {
         let own = self.own_clock("").0;
@@ -169,7 +173,7 @@ impl Stream {
             .min()
     }
 
-    /// The series, in order of time counted from `start` (ns), and remarks.
+    /// The series in order of time, counted from `start` (ns), and a remark.
     #[must_use]
     pub fn series(self, topic: &str, start: i64) -> (Vec<Series>, Option<String>) {
         let (own, remark) = self.own_clock(topic);
@@ -185,7 +189,7 @@ impl Stream {
             .zip(points)
             .map(|(name, mut points)| {
                 points.sort_by_key(|(stamp, _)| *stamp);
-                // Of values with one stamp the last stays.
+                // Of values with the same stamp, keep the last.
                 let mut kept: Vec<(i64, f64)> = Vec::with_capacity(points.len());
                 for point in points {
                     match kept.last_mut() {
@@ -205,7 +209,7 @@ impl Stream {
     }
 }
 
-/// Runs with a further step on the path.
+/// Runs with a further name on the path.
 fn within(path: &mut String, name: &str, run: impl FnOnce(&mut String)) {
     let length = path.len();
     path.push('.');

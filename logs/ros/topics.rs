@@ -1,4 +1,4 @@
-//! All topics of a recording, whatever file holds them.
+//! All topics of a recording, in any kind of file.
 
 use std::collections::BTreeMap;
 
@@ -9,17 +9,17 @@ use super::definition::Definition;
 use super::stream::Stream;
 use crate::raw::RawLog;
 
-/// Deepest nesting of a JSON message that is read; what is deeper is no reading.
+/// Deepest nesting of a JSON message that is read; deeper values are not readings.
 const DEEPEST: usize = 24;
 
 /// How the messages of a topic are read.
 #[derive(Debug)]
 enum Reading {
-    /// CDR under a definition.
+    /// As CDR, with a definition.
     Cdr(Definition),
-    /// JSON.
+    /// As JSON.
     Json,
-    /// Not at all, and why.
+    /// Not at all; the reason.
     Not(String),
 }
 
@@ -28,16 +28,16 @@ enum Reading {
 struct Topic {
     reading: Reading,
     stream: Stream,
-    /// Messages that could not be decoded, and what was wrong with the first.
+    /// Number of messages that could not be decoded, and the fault of the first.
     spoilt: usize,
     fault: String,
     messages: usize,
 }
 
-/// Topics that are being read.
+/// The topics of a recording while it is read.
 #[derive(Debug)]
 pub struct Topics {
-    /// Those to read; all where there are none.
+    /// Topics to read; all if empty.
     chosen: Vec<String>,
     found: BTreeMap<String, Topic>,
 }
@@ -51,12 +51,12 @@ pub struct Described<'a> {
     pub encoding: &'a str,
     /// Encoding of the definition, such as `ros2msg`; empty where there is none.
     pub schema: &'a str,
-    /// The definition.
+    /// The definition's text.
     pub text: &'a [u8],
 }
 
 impl Topics {
-    /// Reads the topics `chosen`, or all where it is empty.
+    /// Reads the topics `chosen`, or all if it is empty.
     #[must_use]
     pub fn new(chosen: &[String]) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl Topics {
         self.chosen.is_empty() || self.chosen.iter().any(|t| t == topic)
     }
 
-    /// Takes a message of a topic, recorded at a time, ns.
+    /// Adds a message of a topic, recorded at a time, ns.
     pub fn push(&mut self, topic: &str, described: Described<'_>, recorded: i64, data: &[u8]) {
         if !self.wants(topic) {
             return;
@@ -109,10 +109,10 @@ impl Topics {
         }
     }
 
-    /// The log.
+    /// The complete log.
     ///
     /// # Errors
-    /// When a topic that was chosen is not there, or none of its messages can be read.
+    /// When a chosen topic is missing, or none of its messages can be read.
     pub fn finish(self, name: &str) -> Result<RawLog, String> {
         for chosen in &self.chosen {
             if !self.found.contains_key(chosen) {
@@ -166,7 +166,7 @@ impl Reading {
     }
 }
 
-/// A JSON message as a message; `true` is 1.
+/// Converts a JSON message; `true` becomes 1.
 fn of_json(json: Json, depth: usize) -> Value {
     if depth > DEEPEST {
         return Value::Skipped;

@@ -1,5 +1,5 @@
-//! Logs that public Python packages wrote (`fixtures/make.py`) are the CSV logs of the same numbers; and no bytes make a
-//! reader panic.
+//! Logs written by public Python packages (`fixtures/make.py`) equal the CSV logs of the same
+//! numbers; and no bytes make a reader panic.
 
 #![allow(clippy::unwrap_used)]
 
@@ -23,7 +23,7 @@ fn scene() -> Scene {
     Scene::from_xml("two-axis", &xml, &[]).unwrap()
 }
 
-/// The episodes at some paths, under the mapping that is proposed for them.
+/// The episodes at some paths, under the proposed mapping.
 fn imported(paths: &[PathBuf]) -> Vec<asid_core::Episode> {
     let scene = scene();
     let plant = Plant::of(&scene).unwrap();
@@ -46,7 +46,7 @@ fn imported(paths: &[PathBuf]) -> Vec<asid_core::Episode> {
     paths.iter().map(one).collect()
 }
 
-/// Compares with the CSV logs; `off` is the largest error of a stored number, a part of it.
+/// Compares with the CSV logs; `off` is the largest relative error of a stored number.
 fn assert_same(paths: &[PathBuf], off: f64) {
     let plant = Plant::of(&scene()).unwrap();
     for (episode, name) in imported(paths).iter().zip(EPISODES) {
@@ -86,7 +86,7 @@ fn mcap_with_messages_of_its_own_definition_is_the_csv_log() {
     assert_same(&in_folder("mcap", ".mcap"), 0.0);
 }
 
-/// Single precision has 24 bits: a degree of a hundred is good to 4e-6 of them, 7e-8 rad.
+/// Single precision has 24 bits: 100 degrees have an error of 4e-6 degrees, 7e-8 rad.
 #[test]
 fn a_dataset_of_lerobot_is_the_csv_log_in_single_precision() {
     let paths: Vec<PathBuf> = (0..4)
@@ -116,7 +116,7 @@ fn a_topic_that_is_not_there_is_named() {
     }
 }
 
-/// Files by their name, with the name that a spoilt copy has, whose ending tells the kind.
+/// Files, each with the name of its damaged copy, whose extension tells the kind.
 fn files() -> [(PathBuf, &'static str); 4] {
     let at = |path: &str| fixtures().join(path);
     [
@@ -141,7 +141,7 @@ fn cut_files_are_refused_or_read_but_never_panic() {
             if let Err(error) = &opened {
                 assert_eq!(error.to_string().lines().count(), 1, "{error}");
             }
-            // Whole pages of SQLite may be missing behind what is read.
+            // Whole pages of SQLite that are not read may be missing at the end.
             assert!(
                 opened.is_err() || name.ends_with("db3"),
                 "{name} cut to {length} bytes was read"
@@ -171,8 +171,10 @@ fn spoilt_files_never_panic() {
     }
 }
 
-/// The head of a page states a list of 150 million elements that take no bytes, and lists like it: `cargo xtask fuzz` found that
-/// `parquet` skips them one by one, for longer than 10 s. Both readers of Parquet refuse the file by what it states, at once.
+/// A page header states a list of 150 million elements without bytes, and similar lists.
+///
+/// `cargo xtask fuzz` found that `parquet` skips them one by one, for longer than 10 s. Both
+/// readers of Parquet refuse the file at once, by what it states.
 #[test]
 fn a_parquet_file_that_states_more_than_there_is_is_refused_at_once() {
     let path = fixtures().join("skips.parquet");
@@ -187,6 +189,6 @@ fn a_parquet_file_that_states_more_than_there_is_is_refused_at_once() {
             "{error}"
         );
     }
-    // Thousandths of a second; the crate takes more than ten seconds for each.
+    // It takes milliseconds; the crate takes more than ten seconds for each.
     assert!(began.elapsed().as_secs_f64() < 5.0);
 }

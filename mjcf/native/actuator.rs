@@ -107,7 +107,7 @@ impl Writer<'_, '_> {
                 node,
                 limit / gear.abs(),
                 drive.force_range.filter(|_| {
-                    // The drive has the limits of a motor with a gain before that gain.
+                    // A drive stores the limits of a motor with a gain before that gain.
                     !matches!(drive.law, DriveLaw::Motor) || drive.gear == declared
                 }),
             );

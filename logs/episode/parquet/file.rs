@@ -1,4 +1,4 @@
-//! A Parquet file whose footer and heads of pages are walked over before the crate `parquet` reads them.
+//! A Parquet file whose footer and page headers are checked before the crate `parquet` reads them.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read as _, Seek as _, SeekFrom};
@@ -12,21 +12,25 @@ use parquet::file::reader::{ChunkReader, Length, SerializedFileReader};
 use super::layouts::{FILE_META_DATA, PAGE_HEADER};
 use super::thrift::Walk;
 
-/// Length of what stands behind the footer: the footer's length in four bytes, and `PAR1`.
+/// Length after the footer: the footer's length in four bytes, and `PAR1`.
 const TAIL: u64 = 8;
 
-/// Field of a page's head that states how long the page is when it is unpacked.
+/// Field of a page header that states the page's uncompressed length.
 const UNPACKED_SIZE: i16 = 2;
-/// Length of an unpacked page that is never refused, bytes: writers begin a new page after 1 to 2 MB.
+/// Length of an uncompressed page that is always accepted, bytes.
+///
+/// Writers begin a new page after 1 to 2 MB.
 const USUAL_PAGE: u64 = 64 << 20;
-/// Most that an unpacked page is longer than its file, beyond that: what is packed closer holds nothing but repetition.
+/// Largest ratio of an uncompressed page's length to the file's, for longer pages.
+///
+/// Data that compresses better contains nothing but repetition.
 const CLOSEST_PACKED: u64 = 256;
 
 /// A Parquet file on disk.
 pub struct ParquetFile(File);
 
 impl ParquetFile {
-    /// Opens a file and looks at its footer.
+    /// Opens a file and checks its footer.
     ///
     /// # Errors
     /// When it cannot be read, or the footer is damaged.
@@ -37,7 +41,7 @@ impl ParquetFile {
     }
 }
 
-/// Walks over the footer, where the file has one; where it has none the crate says so.
+/// Walks over the footer, if the file has one; otherwise the crate reports the error.
 fn walk_footer(file: &mut File) -> Result<(), String> {
     let told = |e: std::io::Error| e.to_string();
     let length = file.metadata().map_err(told)?.len();
@@ -66,7 +70,7 @@ impl Length for ParquetFile {
 impl ChunkReader for ParquetFile {
     type T = BufReader<File>;
 
-    /// Bytes from a place on. The crate asks so for the head of a page, and for the tail of the file.
+    /// Bytes from `start` on. The crate calls this for a page header, and for the tail of the file.
     fn get_read(&self, start: u64) -> ParquetResult<Self::T> {
         let left = self.len().saturating_sub(start);
         if left != TAIL {
@@ -89,7 +93,9 @@ impl ChunkReader for ParquetFile {
     }
 }
 
-/// Walks over the head of a page, and looks at the memory that it asks for: the crate takes it before it unpacks.
+/// Walks over a page header, and checks the memory that it asks for.
+///
+/// The crate allocates it before it decompresses.
 fn walk_page(head: BufReader<File>, left: u64, file: u64) -> Result<(), String> {
     let mut walk = Walk::new(head, left);
     walk.structure(PAGE_HEADER)?;

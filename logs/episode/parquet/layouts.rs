@@ -1,7 +1,8 @@
-//! The structures of Parquet that are read before its values: the footer and the heads of pages, with the types of their fields.
+//! The structures of Parquet that precede its values: the footer and the page headers.
 //!
-//! From <https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift>; of a field that is not here, any
-//! type is taken and skipped. Names are the format's.
+//! They list the types of their fields, from
+//! <https://github.com/apache/parquet-format/blob/master/src/main/thrift/parquet.thrift>. A field
+//! that is not listed may have any type and is skipped. Names are the format's.
 
 use super::thrift::Kind::{Binary, Bool, Byte, Double, List, Struct, Whole};
 use super::thrift::{Kind, Layout};
@@ -158,7 +159,7 @@ const DATA_PAGE_HEADER_V2: &Layout = &[
     (8, Struct(STATISTICS)),
 ];
 
-/// The head of a page.
+/// A page header.
 pub const PAGE_HEADER: &Layout = &[
     (1, Whole),
     (2, Whole),

@@ -1,36 +1,39 @@
-//! A walk over Thrift's compact protocol, in which Parquet states what a file holds: it builds nothing, and takes no longer than the bytes
-//! are many.
+//! Checks structures in Thrift's compact protocol, in which Parquet states what a file holds.
 //!
-//! The crate `parquet` skips a field that it does not know element by element, and takes as many elements as the file states. Elements that
-//! take no bytes, such as booleans there, keep it busy for as long as the file likes. The walk goes first. It takes each
-//! field that the format knows as the crate does, and refuses one of another type, so that both see the same fields.
-//! The protocol: <https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>.
+//! It builds nothing, and its time is bounded by the number of bytes. The crate `parquet` skips an
+//! unknown field element by element, as many elements as the file states. Elements without bytes,
+//! such as booleans there, would keep it busy for arbitrarily long. This walk therefore runs first.
+//! It reads each field that the format knows as the crate does, and refuses one of another type, so
+//! that both see the same fields.
+//!
+//! The protocol:
+//! <https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>.
 
 use std::io::{BufRead, Seek};
 
-/// What a value is. Whole numbers of 16, 32 and 64 bits are written alike.
+/// Type of a value. Integers of 16, 32 and 64 bits have the same encoding.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
-    /// True or false; as a field it is part of the field's type.
+    /// A boolean; in a field it is part of the field's type.
     Bool,
     /// One byte.
     Byte,
-    /// A whole number of variable length.
+    /// An integer of variable length.
     Whole,
-    /// Eight bytes.
+    /// A float of eight bytes.
     Double,
-    /// A text or bytes, behind their length.
+    /// A text or bytes, after their length.
     Binary,
-    /// Elements of one kind.
+    /// A list of elements of one kind.
     List(&'static Kind),
-    /// Fields by their numbers.
+    /// A structure with numbered fields.
     Struct(&'static Layout),
 }
 
 /// Fields of a structure that the format knows, by number.
 pub type Layout = [(i16, Kind)];
 
-/// Types of the protocol: those that have no bytes, and those with other values in them.
+/// Types of the protocol: first those without bytes, then those with a value.
 const STOP: u8 = 0;
 const TRUE: u8 = 1;
 const FALSE: u8 = 2;
@@ -45,9 +48,11 @@ const MAP: u8 = 11;
 const STRUCT: u8 = 12;
 const UUID: u8 = 13;
 
-/// Deepest nesting of values, levels: what the crate `parquet` skips at most. The format's own structures have eight.
+/// Deepest nesting of values, levels: the most that the crate `parquet` skips.
+///
+/// The format's own structures have eight.
 const DEEPEST: usize = 64;
-/// Longest number of variable length, bytes: 64 bits, 7 in each.
+/// Longest integer of variable length, bytes: 64 bits, 7 in each.
 const LONGEST_NUMBER: u32 = 10;
 
 impl Kind {
@@ -64,17 +69,17 @@ impl Kind {
     }
 }
 
-/// Bytes that are walked over.
+/// A walk over bytes.
 pub struct Walk<R> {
     bytes: R,
-    /// Bytes that are left.
+    /// Remaining bytes.
     left: u64,
-    /// Whole numbers of the structure itself, by field.
+    /// Integers of the outermost structure, by field.
     numbers: Vec<(i16, i64)>,
 }
 
 impl<R: BufRead + Seek> Walk<R> {
-    /// Begins where `bytes` stands, with `left` bytes from there on.
+    /// Begins at the position of `bytes`, with `left` bytes from there on.
     pub fn new(bytes: R, left: u64) -> Self {
         Self {
             bytes,
@@ -83,7 +88,7 @@ impl<R: BufRead + Seek> Walk<R> {
         }
     }
 
-    /// The whole number that a field of the structure had; the last one, where the field stood twice.
+    /// The integer of a field of the outermost structure; the last one if there are several.
     pub fn number(&self, field: i16) -> Option<i64> {
         let found = self.numbers.iter().rev().find(|(n, _)| *n == field);
         found.map(|(_, x)| *x)
@@ -92,7 +97,8 @@ impl<R: BufRead + Seek> Walk<R> {
     /// Walks over a structure.
     ///
     /// # Errors
-    /// Where it ends early, states more than there is, or has a field of another type than the format.
+    /// When it ends early, states more than there is, or has a field of another type than the
+    /// format.
     pub fn structure(&mut self, layout: &Layout) -> Result<(), String> {
         self.fields(layout, DEEPEST)
     }
@@ -130,7 +136,7 @@ impl<R: BufRead + Seek> Walk<R> {
         }
     }
 
-    /// A value of the format, whose type was looked at.
+    /// Walks over a value of the format, whose type was checked.
     fn known(&mut self, kind: Kind, depth: usize) -> Result<(), String> {
         let depth = deeper(depth)?;
         match kind {
@@ -152,7 +158,7 @@ impl<R: BufRead + Seek> Walk<R> {
         }
     }
 
-    /// A value that the format does not know: it is skipped.
+    /// Skips a value of a field that the format does not know.
     fn unknown(&mut self, wire: u8, depth: usize) -> Result<(), String> {
         let depth = deeper(depth)?;
         match wire {
@@ -198,8 +204,10 @@ impl<R: BufRead + Seek> Walk<R> {
         Ok((wire, size))
     }
 
-    /// Whether what is left can hold so many elements: each takes a byte at least. Parquet has no lists of booleans in these
-    /// places, and readers do not agree on whether one takes a byte.
+    /// Checks that the remaining bytes can hold a list: each element takes at least one byte.
+    ///
+    /// Parquet has no lists of booleans here, and readers disagree on whether a boolean takes a
+    /// byte.
     fn holds(&self, size: u64, wire: u8) -> Result<(), String> {
         if size > self.left {
             return Err(format!(
@@ -220,7 +228,7 @@ impl<R: BufRead + Seek> Walk<R> {
         self.skip(length)
     }
 
-    /// A number of variable length, its lowest bits first.
+    /// An integer of variable length, its lowest bits first.
     fn whole(&mut self) -> Result<u64, String> {
         let mut number = 0;
         for place in 0..LONGEST_NUMBER {
@@ -259,7 +267,7 @@ impl<R: BufRead + Seek> Walk<R> {
     }
 }
 
-/// The number that is written with its sign in the last place.
+/// Decodes an integer whose lowest bit is its sign (zigzag).
 fn signed(written: u64) -> i64 {
     (written >> 1) as i64 ^ -((written & 1) as i64)
 }
@@ -280,7 +288,7 @@ mod tests {
         Walk::new(Cursor::new(bytes), bytes.len() as u64).structure(layout)
     }
 
-    /// 2^31 - 1 as a number of variable length.
+    /// 2^31 - 1 as an integer of variable length.
     const MANY: [u8; 5] = [0xff, 0xff, 0xff, 0xff, 0x07];
 
     #[test]
@@ -300,7 +308,7 @@ mod tests {
         assert!(said.contains("states 2147483647 elements"), "{said}");
     }
 
-    /// The crate takes booleans of a list for nothing where it skips them.
+    /// The crate counts booleans of a skipped list as no bytes.
     #[test]
     fn booleans_in_a_list_are_refused_and_as_fields_are_not() {
         let said = walk(&[0x10 | LIST, 0x20 | FALSE, 1, 1, 0], &[]).unwrap_err();
@@ -314,7 +322,7 @@ mod tests {
     #[test]
     fn a_field_of_another_type_than_the_formats_is_refused() {
         let layout = [(1, Kind::Whole), (4, Kind::List(&Kind::Binary))];
-        // Fields 1 (a number), 4 (two texts), 9 (eight bytes that nobody knows).
+        // Fields 1 (a number), 4 (two texts), 9 (eight bytes of an unknown field).
         let good = [
             0x15, 0x80, 0x01, 0x39, 0x28, 1, b'a', 0, 0x57, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         ];
