@@ -108,7 +108,7 @@ fn nearest(rows: &[f64], time: f64) -> Option<usize> {
 
 /// A command over each row: the mean of what was sent from its stamp to the next.
 ///
-/// NaN where nothing is known.
+/// NaN without any command, and in a last row that precedes the first command.
 #[must_use]
 pub fn commands(series: &Series, rows: &[f64]) -> Vec<f64> {
     let last = rows.len().saturating_sub(1);

@@ -103,7 +103,7 @@ impl Designer<'_, '_> {
         })
     }
 
-    /// A random drive's curve of `knots` heights, as heights of the search's spline.
+    /// A drive's random curve of `knots` heights, as heights of the search's spline.
     ///
     /// The largest has magnitude 1.
     fn curve(&self, knots: usize, rng: &mut Rng) -> Vec<f64> {
