@@ -1,8 +1,9 @@
-//! A planar arm that flails about, integrated by hand: two point masses on rods, driven at
-//! both joints, chaotic over its episodes.
+//! A planar arm in fast motion, integrated by hand: two point masses on rods, driven at both
+//! joints. Its motion is chaotic over an episode.
 //!
-//! Runge and Kutta's method at a tenth of a millisecond, where the model takes steps of two: the
-//! model's own integrator is off by hundreds of deviations of the noise at the end.
+//! The logs come from a Runge-Kutta integration with a step of 0.1 ms. The model takes steps of 2
+//! ms, so at the end of an episode its integrator is off by hundreds of standard deviations of the
+//! noise.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -26,16 +27,16 @@ const NOMINAL: &str = r#"<mujoco model="arm"><option timestep="0.002" integrator
 "#;
 
 const LENGTH: [f64; 2] = [0.3, 0.25];
-/// Mass of the real forearm, kg; the model has half a kilogram.
+/// Mass of the real forearm, kg. The model has 0.5 kg.
 pub const FORE: f64 = 0.6;
 const UPPER: f64 = 1.0;
 const DAMPING: [f64; 2] = [0.1, 0.02];
 const NOISE: f64 = 1e-3;
 const SECONDS: f64 = 4.0;
-/// What the shoulder's drive really gives of its command.
+/// Gain of the real shoulder drive: the share of its command that it applies.
 pub const GAIN: f64 = 0.75;
 
-/// Held for 10 ms, N m.
+/// Torques at a row, N m, each held for 10 ms.
 fn command(episode: usize, row: usize) -> [f64; 2] {
     let (k, t) = (episode as f64, row as f64 * 0.01);
     [
@@ -44,7 +45,7 @@ fn command(episode: usize, row: usize) -> [f64; 2] {
     ]
 }
 
-/// Accelerations at angles and speeds under torques.
+/// Joint accelerations at the given angles, speeds and torques.
 fn acceleration(q: [f64; 2], v: [f64; 2], torque: [f64; 2]) -> [f64; 2] {
     let [a, b] = LENGTH;
     let ball = |m: f64| 0.4 * m * 1e-4;

@@ -1,4 +1,4 @@
-//! A ball that bounces: bodies touch, and short replays decide.
+//! A bouncing ball: bodies touch, and replays of short segments decide.
 
 use std::path::Path;
 
@@ -12,12 +12,15 @@ use super::{assert_names, has_contacts, run_on};
 /// Rows of a log, and the time between them, s.
 const ROWS: usize = 90;
 const ROW: f64 = 0.02;
-/// Deviation of a reading, m.
+/// Standard deviation of a reading, m.
 const NOISE: f64 = 1e-3;
 /// Time steps of the model and of the real ball, s.
 const STEPS: [f64; 2] = [0.001, 0.0005];
 
-/// The ball above a floor that gives way, with gravity `down` the floor and along it, and a contact whose damping is so many times the model's.
+/// A ball above a compliant floor.
+///
+/// Gravity has the components `along` the floor and `down` onto it. The contact has `damping` times
+/// the model's damping.
 fn scene(timestep: f64, [along, down]: [f64; 2], damping: f64) -> String {
     let solref = format!("-40000 -{}", 18.0 * damping);
     format!(
@@ -29,14 +32,17 @@ fn scene(timestep: f64, [along, down]: [f64; 2], damping: f64) -> String {
     )
 }
 
-/// The ball on a floor that is tilted by an angle, rad.
+/// The ball on a floor that is tilted by `tilt`, rad.
 fn tilted(tilt: f64) -> String {
     let (sin, cos) = tilt.sin_cos();
     scene(STEPS[1], [9.81 * sin, 9.81 * cos], 1.0)
 }
 
-/// Writes logs of a real ball, and the model that does not know of what it has: so many, the last to hold out, of which some are thrown from so
-/// `high` that they never touch the floor; with the columns of their starts, or without.
+/// Writes logs of a real ball, and a model that lacks the real ball's effect.
+///
+/// The last of the `episodes` logs is held out. The ball of the logs in `high` is thrown from so
+/// high that it never touches the floor. `starts` says whether the logs have the columns of the
+/// initial state.
 fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), starts: bool) {
     let mut player = Player::of(real, &["place"], [ROW, STEPS[1]]);
     for episode in 0..episodes {
@@ -44,7 +50,7 @@ fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), start
         let up = match starts {
             true if high.contains(&episode) => 20.0,
             true => 0.3 + 0.1 * k,
-            // It touches the floor within the first tenth.
+            // The ball touches the floor within the first tenth of the log.
             false => 0.06 + 0.01 * k,
         };
         let qpos = [0.0, 0.0, up, 1.0, 0.0, 0.0, 0.0];
@@ -62,7 +68,7 @@ fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), start
     write_model(folder, &scene(STEPS[0], [0.0, 9.81], 1.0));
 }
 
-/// The diagnosis of such logs; `None` with an engine whose floors do not give way.
+/// The diagnosis of such logs; `None` with an engine that has no compliant contacts.
 fn diagnosed_with(real: &str, logs: (u32, &[u32]), starts: bool) -> Option<Diagnosis> {
     if !has_contacts() {
         return None;
@@ -82,7 +88,7 @@ fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
         return;
     };
     assert_names(&r, &["gravity-tilt"]);
-    // A bounce at twice the ball's time step is a little another one.
+    // At twice the ball's time step a bounce differs slightly.
     assert!(r.gap.refined < 0.1 * r.gap.identified, "{:?}", r.gap);
     let pitch = r.effects[0].parameters["pitch"];
     assert!((pitch - 0.05).abs() < 0.002, "{pitch}");
@@ -99,7 +105,8 @@ fn a_ball_that_lacks_nothing_is_accused_of_nothing() {
     assert!(r.gap.identified < 4.0, "{:?}", r.gap);
 }
 
-/// All candidates are first tried along each third log, and here nothing touches in these. A force through the ball's centre does to it what a tilt does.
+/// The screening uses every third log, and here these have no contact. A force at the ball's centre
+/// has the same effect as a tilt.
 #[test]
 fn flights_among_bounces_are_taken_as_bounces_are() {
     let Some(r) = diagnosed(&tilted(0.05), (7, &[1, 4])) else {
@@ -114,7 +121,8 @@ fn flights_among_bounces_are_taken_as_bounces_are() {
     assert!(r.gap.refined < 0.1 * r.gap.identified, "{:?}", r.gap);
 }
 
-/// The slope at the model's own damping tells less than half of what a bounce with three times as much loses.
+/// At the model's own damping the derivative predicts less than half of the energy that a bounce
+/// with three times that damping loses.
 #[test]
 fn a_floor_that_takes_three_times_as_much_is_named() {
     let real = scene(STEPS[1], [0.0, 9.81], 3.0);
@@ -125,8 +133,10 @@ fn a_floor_that_takes_three_times_as_much_is_named() {
     assert!(r.gap.refined < 0.2 * r.gap.identified, "{:?}", r.gap);
 }
 
-/// Its spin about the normal of the floor hardly shows, and a fit of its start stepped by ten thousand rad/s there: the replay had then nothing to do with
-/// the log, from which no slope leads back.
+/// The spin about the normal of the floor has hardly any effect on the readings.
+///
+/// Guards against fits of the initial state that step this spin by ten thousand rad/s. Such a
+/// replay no longer resembles the log, and no derivative leads back.
 #[test]
 fn a_ball_whose_start_no_log_gives_is_replayed_from_where_it_began() {
     let Some(d) = diagnosed_with(&tilted(0.0), (5, &[]), false) else {

@@ -1,4 +1,6 @@
-//! A pendulum on a servo, integrated by hand: a sensor that drifts beyond what the drive can hold, and a drive whose limit the logs held out
+//! A pendulum on a servo, integrated by hand.
+//!
+//! One sensor drifts beyond what the drive can hold. One drive has a limit that the held-out logs
 //! never reach.
 
 use super::one_joint::{joint_log, normal};
@@ -13,19 +15,21 @@ const NOMINAL: &str = r#"<mujoco model="servo"><option timestep="0.001" integrat
 </mujoco>
 "#;
 const MASS: &str = "name = \"mass\"\ntarget = \"geom/ball/mass\"\nrange = [0.2, 0.7]";
-/// Length, m, mass, kg, and radius of the ball, m.
+/// Length, m, mass, kg, and radius of the bob, m.
 const BOB: (f64, f64, f64) = (0.22, 0.4, 0.03);
 const GRAVITY: f64 = 9.81;
 const DAMPING: f64 = 0.03;
-/// Gains of the servo, N m/rad and N m s/rad, and the most that it gives, N m.
+/// Gains of the servo, N m/rad and N m s/rad, and its largest torque, N m.
 const GAINS: [f64; 2] = [8.0, 0.25];
 const LIMIT: f64 = 2.5;
-/// Deviation of the noise, rad.
+/// Standard deviation of the noise, rad.
 const NOISE: f64 = 3e-3;
 const SECONDS: f64 = 3.2;
 const ROW: f64 = 0.004;
 
-/// A log of commands of some size, rad, read by a sensor that drifts by `rate`, rad/s, from a drive that gives no more than `limit`, N m.
+/// A log of commands of amplitude `size`, rad.
+///
+/// The sensor drifts by `rate`, rad/s, and the drive applies at most `limit`, N m.
 fn log(episode: usize, size: f64, (rate, limit): (f64, f64)) -> String {
     let mut noise = normal(70 + episode as u64);
     let mut row = 0.0;
@@ -46,7 +50,9 @@ fn log(episode: usize, size: f64, (rate, limit): (f64, f64)) -> String {
     joint_log(header, [SECONDS, ROW], 40, (command, step), off)
 }
 
-/// Half a radian at the end, for which the servo would give 4 N m: along the readings the drive is at its limit, and no slope tells of the sensor.
+/// At the end the sensor is off by half a radian, for which the servo would need 4 N m.
+///
+/// Along the readings the drive is therefore saturated, and no derivative points to the sensor.
 #[test]
 fn a_sensor_that_drifts_beyond_the_drives_limit_is_named() {
     let rate = -0.16;
@@ -65,7 +71,7 @@ fn a_limit_that_the_logs_held_out_never_reach_is_named() {
     let limit = 0.7;
     let folder = tempfile::tempdir().unwrap();
     let size = |episode: usize| if episode < 4 { 0.6 } else { 0.06 };
-    // A mass that could take the limit's place would make a gap of its own.
+    // A mass free to compensate for the limit would cause a gap of its own.
     let mass = MASS.replace("[0.2, 0.7]", "[0.39, 0.41]");
     write_files(folder.path(), NOMINAL, &mass, |episode| {
         log(episode, size(episode), (0.0, limit))

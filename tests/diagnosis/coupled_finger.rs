@@ -1,4 +1,4 @@
-//! Fingers of a gripper that an equality couples, with dry friction that the model lacks.
+//! Two gripper fingers coupled by an equality constraint, with dry friction that the model lacks.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,13 +10,13 @@ use super::played::Player;
 use super::rows::{write_episode, write_model};
 use super::{has_contacts, run_on};
 
-/// Rows of a log, the time between them and a time step, s, and the deviation of a reading, m.
+/// Rows of a log, time between them and time step, s, and standard deviation of a reading, m.
 const ROWS: usize = 300;
 const ROW: f64 = 0.01;
 const STEP: f64 = 0.002;
 const NOISE: f64 = 5e-5;
 
-/// Two fingers on slides that a servo of one closes, with `friction` (N) of that one.
+/// Two fingers on slides. A servo drives one of them, which has dry friction `friction` (N).
 fn scene(friction: f64) -> String {
     format!(
         r#"<mujoco model="gripper"><option timestep="0.002" integrator="implicitfast"/><worldbody>
@@ -56,7 +56,8 @@ fn write_study(folder: &Path) {
     write_model(folder, &scene(0.0));
 }
 
-/// A dead band of the drive shows five times what the friction does before either is fitted. Which of the two it is only fits can tell.
+/// Before either is fitted, a dead band of the drive shows five times the evidence of the friction.
+/// Only fits tell the two apart.
 #[test]
 fn friction_of_a_coupled_finger_is_fitted_beside_a_dead_band_that_leads() {
     if !has_contacts() {

@@ -1,4 +1,5 @@
-//! An axis without a spring or a servo: it adds up every force, so that a small one that nobody named carries its whole replay away.
+//! An axis without a spring or a servo. It integrates every force, so that a small unmodelled force
+//! makes its whole replay drift.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -9,18 +10,19 @@ use rand_chacha::ChaCha8Rng;
 
 use super::run_on;
 
-/// Mass, kg; the model has 80.
+/// Mass, kg. The model has 80 kg.
 const MASS: f64 = 95.0;
-/// Viscous friction, N s/m, as in the model, and dry friction, N, which it lacks.
+/// Viscous friction, N s/m, which the model has, and dry friction, N, which it lacks.
 const DAMPING: f64 = 100.0;
 const FRICTION: f64 = 15.0;
-/// Size, N, and angular frequency, rad/s, of the force that no effect is.
+/// Amplitude, N, and angular frequency, rad/s, of a force that no effect of the catalogue
+/// describes.
 const HIDDEN: [f64; 2] = [1.5, 0.8];
-/// Rows of a log, the time between them, s, and integration steps of each.
+/// Rows of a log, time between them, s, and integration steps per row.
 const ROWS: usize = 300;
 const ROW: f64 = 0.02;
 const STEPS: usize = 40;
-/// Speed within which friction is a tangent, m/s, and deviation of a reading, m.
+/// Speed within which friction is linear, m/s, and standard deviation of a reading, m.
 const CREEP: f64 = 2e-4;
 const NOISE: f64 = 1e-4;
 
@@ -74,7 +76,7 @@ fn write(folder: &Path) {
     std::fs::write(folder.join("study.toml"), STUDY).unwrap();
 }
 
-/// Whole replays alone would have 86.5 ± 2.5 kg.
+/// A fit to whole replays alone gives 86.5 ± 2.5 kg.
 #[test]
 fn an_axis_that_drifts_keeps_the_mass_that_its_motion_from_row_to_row_tells() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Effects that are far from their null: a motor that gives a tenth of what is asked of it, a stiff spring.
+//! Effects that are far from their null value: a motor with a tenth of the force that is commanded,
+//! and a stiff spring.
 
 use super::world::Truth;
 use super::{assert_names, run};
@@ -12,7 +13,8 @@ fn a_motor_that_gives_a_tenth_of_what_is_asked_is_a_limit() {
     assert!((limit - 0.6).abs() < 0.03, "{limit}");
 }
 
-/// A spring is plausible up to 200 N m/rad or N/m on a table: that of a heavier machine is not cut off there.
+/// On a table a spring of up to 200 N m/rad or N/m is plausible. The stiffer spring of a heavier
+/// machine must not be cut off there.
 #[test]
 fn a_spring_ten_times_as_stiff_as_any_on_a_table_is_found() {
     let (found, _) = run(Truth::Spring(2000.0), &[]);

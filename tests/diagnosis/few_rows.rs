@@ -1,4 +1,5 @@
-//! Logs of ten rows, by machines of six joints whose starts nothing gives: as many readings as there are sensors.
+//! Logs of ten rows, of machines with six joints and without initial states in the logs. The number
+//! of encoders varies.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,14 +11,15 @@ use super::played::Player;
 use super::rows::write_model;
 use super::{has_contacts, run_on};
 
-/// Joints, rows of a log, the time between them and a time step, s, and the deviation of a reading, rad.
+/// Joints, rows of a log, time between them and time step, s, and standard deviation of a reading,
+/// rad.
 const JOINTS: usize = 6;
 const ROWS: usize = 10;
 const ROW: f64 = 0.05;
 const STEP: f64 = 0.001;
 const NOISE: f64 = 1e-3;
 
-/// Pendulums that a motor each swings, the first `read` of them with an encoder.
+/// Pendulums, each driven by a motor; the first `read` of them have an encoder.
 fn scene(read: usize) -> String {
     let mut bodies = String::new();
     let (mut motors, mut sensors) = (String::new(), String::new());
@@ -75,7 +77,7 @@ fn write_study(folder: &Path, read: usize) {
     write_model(folder, &scene);
 }
 
-/// Sixty readings of a log tell more than its twelve unknown coordinates, though ten rows are fewer.
+/// Ten rows are fewer than the twelve unknown coordinates of a log, but they hold sixty readings.
 #[test]
 fn ten_rows_of_six_encoders_are_diagnosed() {
     if !has_contacts() {

@@ -1,4 +1,5 @@
-//! An arm whose elbow begins at its stop, with an encoder that is filtered and logs that do not say where they begin.
+//! An arm whose elbow begins at its stop. One encoder is filtered, and the logs do not give their
+//! initial states.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,17 +9,17 @@ use super::played::Player;
 use super::rows::{write_episode, write_model};
 use super::{assert_names, has_contacts, run_on};
 
-/// Rows of a log, the time between them and a time step, s, and the deviation of a reading, rad.
+/// Rows of a log, time between them and time step, s, and standard deviation of a reading, rad.
 const ROWS: usize = 400;
 const ROW: f64 = 0.005;
 const STEP: f64 = 0.001;
 const NOISE: f64 = 3e-3;
-/// Logs, of which two are held out.
+/// Number of logs; two of them are held out.
 const EPISODES: u32 = 6;
 /// Time constant of the elbow's encoder, s.
 const FILTER: f64 = 0.04;
 
-/// Two links that motors swing in a plane.
+/// Two links in a plane, driven by motors.
 const ARM: &str = r#"<mujoco model="arm"><compiler angle="radian"/><option timestep="0.001" gravity="0 0 0"/>
   <worldbody><body name="upper"><joint name="shoulder" type="hinge" axis="0 0 1" damping="0.1" armature="0.04"/>
     <geom name="upper" type="capsule" fromto="0 0 0 0.4 0 0" size="0.03" mass="1" contype="0" conaffinity="0"/>
@@ -37,7 +38,9 @@ fn torques(episode: u32, time: f64) -> [f64; 2] {
     [shoulder, elbow]
 }
 
-/// What a filter of a time constant reads of values, row by row, which are straight between the rows; it has read the first for long.
+/// Returns the output of a first-order filter for `values`, one per row.
+///
+/// The values are linear between rows. The filter begins in steady state at the first value.
 fn filtered(values: &[f64], time_constant: f64) -> Vec<f64> {
     let mut out = vec![values[0]];
     let keeps = (-ROW / time_constant).exp();
@@ -76,8 +79,11 @@ fn write_study(folder: &Path) {
     write_model(folder, ARM);
 }
 
-/// At the stop slopes change from step to step: the fit without effects ends before it is at its best, any first set seems to tell what it
-/// owes to a better trajectory, and a slope promises a hundredth of what the filter tells.
+/// At the stop the derivatives change from step to step, so the fit without effects ends before its
+/// optimum.
+///
+/// Any first set then seems to earn evidence that comes from a better trajectory. The derivative
+/// promises a hundredth of the filter's evidence.
 #[test]
 fn a_filter_is_found_though_slopes_at_a_stop_promise_little() {
     if !has_contacts() {

@@ -1,4 +1,5 @@
-//! A cart whose dry friction falls a little as it speeds up, integrated by hand: dry friction that does not makes up for most of it.
+//! A cart whose dry friction falls slightly with speed, integrated by hand. Constant dry friction
+//! makes up for most of it.
 
 use super::one_joint::{joint_log, normal};
 use super::world::write_files;
@@ -11,16 +12,17 @@ const NOMINAL: &str = r#"<mujoco model="cart"><option timestep="0.002" integrato
   <sensor><jointpos name="x" joint="rail"/></sensor></mujoco>"#;
 const MASS: f64 = 1.0;
 const DAMPING: f64 = 0.5;
-/// Friction while the cart slides fast, what it has above that at rest, N, and the speed at which most of that is gone, m/s.
+/// Friction at high speed, and its excess at rest, N; speed at which most of the excess is gone,
+/// m/s.
 const COULOMB: f64 = 2.0;
 const BREAKAWAY: f64 = 1.2;
 const SPEED: f64 = 0.1;
-/// Deviation of a reading, m, the time between readings, s, and how long a log is.
+/// Standard deviation of a reading, m, time between readings, s, and length of a log, s.
 const NOISE: f64 = 3e-4;
 const ROW: f64 = 0.01;
 const SECONDS: f64 = 4.0;
 
-/// Symplectic Euler; the friction brings the cart to a stand and no further.
+/// One step of symplectic Euler. Friction stops the cart but does not reverse it.
 fn step([x, v]: [f64; 2], force: f64, h: f64) -> [f64; 2] {
     let friction = COULOMB + BREAKAWAY * (-(v / SPEED).powi(2)).exp();
     let pushed = v + h * (force - DAMPING * v) / MASS;
@@ -42,7 +44,8 @@ fn log(episode: usize) -> String {
     )
 }
 
-/// The finer law began without the friction of the simpler one, whose place it took, and never came to it.
+/// Guards against a refinement whose fit begins without the friction of the law that it replaces.
+/// Such a fit does not reach its optimum.
 #[test]
 fn a_friction_that_falls_with_the_speed_is_told_from_one_that_does_not() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! A log that begins while a command from before it acts: the force of the drive in its first row is one that no model can predict.
+//! A log that begins while an earlier command still acts. No model can predict the drive's force in
+//! its first row.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -14,12 +15,12 @@ use super::played::Player;
 use super::rows::{write_episode, write_model};
 use super::{engine, has_contacts, run_on};
 
-/// Rows of a log, how many the machine has moved for before it, the time between them and a time step, s.
+/// Rows of a log, rows of motion before it, time between rows and time step, s.
 const ROWS: usize = 100;
 const BEFORE: usize = 10;
 const ROW: f64 = 0.01;
 const STEP: f64 = 0.002;
-/// Deviations of the readings: rad, and N m.
+/// Standard deviations of the readings of angle, rad, and torque, N m.
 const NOISE: [f64; 2] = [1e-3, 0.01];
 
 const SCENE: &str = r#"<mujoco model="swing"><compiler angle="radian"/><option timestep="0.002"/><worldbody>
@@ -29,7 +30,7 @@ const SCENE: &str = r#"<mujoco model="swing"><compiler angle="radian"/><option t
     <sensor><jointpos name="angle" joint="swing"/><jointvel name="speed" joint="swing"/>
       <actuatorfrc name="torque" actuator="servo"/></sensor></mujoco>"#;
 
-/// Logs of the model itself that begin in the middle of its motion, with the state there.
+/// Writes logs of the model itself that begin in mid-motion, with the state there.
 fn write_study(folder: &Path) {
     let mut player = Player::of(SCENE, &["angle", "speed", "torque"], [ROW, STEP]);
     for episode in 0..4_u32 {
@@ -58,7 +59,8 @@ fn write_study(folder: &Path) {
     write_model(folder, SCENE);
 }
 
-/// The command of row 9 acts when row 10 is read, with which the log begins: that the force of the drive is another one there is no gap.
+/// The log begins with row 10, when the command of row 9 still acts. The drive's force differs
+/// there, and that is no gap.
 #[test]
 fn a_force_under_a_command_from_before_the_log_is_no_gap() {
     if !has_contacts() {
@@ -71,7 +73,7 @@ fn a_force_under_a_command_from_before_the_log_is_no_gap() {
     assert!(result.gap.nominal < 1.1, "{}", result.gap.nominal);
 }
 
-/// Of a position, a speed and the force of a drive the last one follows the command at once.
+/// Of a position, a speed and the force of a drive, only the force follows the command at once.
 #[test]
 fn the_force_of_a_drive_follows_the_command_and_its_joint_does_not_yet() {
     if !has_contacts() {

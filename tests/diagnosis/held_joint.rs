@@ -1,4 +1,5 @@
-//! Two servos, one of them behind a gear that nearly holds: its friction is 0.94 of what the drive gives, integrated by hand.
+//! Two servos, integrated by hand. The gear of one nearly holds: its friction is 0.94 of the
+//! drive's torque.
 
 use super::one_joint::{machine_log, normal};
 use super::world::write_files;
@@ -14,14 +15,15 @@ const NOMINAL: &str = r#"<mujoco model="head"><option timestep="0.002" integrato
 </mujoco>
 "#;
 const STUDY: &str = "name = \"damping\"\ntarget = \"joint/pan/damping\"\nrange = [0.005, 0.1]";
-/// Inertias about the one axis, kg m²; the joints turn in line, so that a torque between the bodies is all that couples them.
+/// Inertias about the common axis, kg m². The joints are in line, so only a torque between the
+/// bodies couples them.
 const INERTIA: [f64; 2] = [0.012, 0.008];
 /// Gains of both servos, N m/rad and N m s/rad, and damping of the joints, N m s/rad.
 const GAINS: [f64; 2] = [4.0, 0.1];
 const DAMPING: [f64; 2] = [0.03, 0.02];
-/// Friction of the second joint relative to the force of its drive.
+/// Friction of the second joint relative to the torque of its drive.
 const FRICTION: f64 = 0.94;
-/// Deviation of a reading, rad.
+/// Standard deviation of a reading, rad.
 const NOISE: f64 = 1.5e-3;
 const SECONDS: f64 = 4.0;
 const ROW: f64 = 0.01;
@@ -37,7 +39,8 @@ fn commands(episode: usize, time: f64) -> [f64; 2] {
     ]
 }
 
-/// Places and speeds of both joints after a step of `h`: symplectic Euler, the friction smooth over a creep of 1 mrad/s.
+/// Positions and speeds of both joints after a step of `h`: symplectic Euler, with friction
+/// smoothed over 1 mrad/s.
 fn step(q: [f64; 2], v: [f64; 2], u: [f64; 2], h: f64) -> ([f64; 2], [f64; 2]) {
     let drive = [0, 1].map(|i| GAINS[0] * (u[i] - q[i]) - GAINS[1] * v[i]);
     let friction = FRICTION * drive[1].abs() * (v[1] / 1e-3).tanh();
@@ -67,8 +70,8 @@ fn log(episode: usize) -> String {
     machine_log(header, ([SECONDS, ROW], 2000), (rest, "0,0,0,0"), machine)
 }
 
-/// From row to row a friction of 0.94 of the drive is much like one of 0.99, or like a servo that is far too soft; where the joint has gone to
-/// by and by is not.
+/// From row to row, a friction of 0.94 of the drive resembles one of 0.99, or a servo that is far
+/// too soft. Over a whole replay the joint's position tells them apart.
 #[test]
 fn a_friction_that_nearly_holds_a_joint_is_named_with_its_value() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! A servo that is told to stand, settles beside its goal, and has another zero at each log.
+//! A servo that holds a constant command, settles beside it, and has another sensor zero in each
+//! log.
 
 use std::fmt::Write as _;
 
@@ -16,16 +17,16 @@ const NOMINAL: &str = r#"<mujoco model="servo"><option timestep="0.001" integrat
 const INERTIA: f64 = 0.02;
 const DAMPING: f64 = 0.28;
 const KP: f64 = 8.0;
-/// By how much the servo misses its goal, rad.
+/// Offset of the servo from its command, rad.
 const BIAS: f64 = -0.23;
-/// What the sensor reads at zero, in each log, rad.
+/// Reading of the sensor at zero in each log, rad.
 const ZEROS: [f64; 6] = [0.13, -0.14, 0.03, -0.32, 0.46, -0.05];
-/// Deviation of a reading, rad.
+/// Standard deviation of a reading, rad.
 const NOISE: f64 = 3e-3;
 const ROW: f64 = 0.02;
 const ROWS: usize = 120;
 
-/// Angle after a time in s: the step response of a damped oscillator that begins at rest.
+/// Returns the angle at a time, s: the step response of a damped oscillator that begins at rest.
 fn angle(time: f64) -> f64 {
     let frequency = (KP / INERTIA).sqrt();
     let ratio = DAMPING / (2.0 * (KP * INERTIA).sqrt());
@@ -47,8 +48,10 @@ fn log(episode: usize) -> String {
     text + "\n"
 }
 
-/// Where the sensor's zero is missing, the model must jump to the first reading. From the two rows of that jump a dry friction was told
-/// that would hold the servo anywhere, so that nothing could be said of where it stands.
+/// Without the sensor's zero the model must jump to the first reading.
+///
+/// Guards against a dry friction estimated from the two rows of that jump. It could hold the servo
+/// anywhere, and hide where the servo stands.
 #[test]
 fn a_servo_that_misses_its_goal_is_named_beside_a_sensor_that_is_homed() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Slopes in what nothing couples, taken together, are those taken one by one.
+//! Derivatives of uncoupled parts: perturbing the parts together gives the same as one by one.
 
 use asid::core::episode::ChannelColumns;
 use asid::core::{Episode, Scene};
@@ -11,7 +11,7 @@ use asid::diagnosis::machine::Machine;
 use crate::diagnosis_support::engine;
 use crate::row_slopes::largest_difference;
 
-/// Two arms of two hinges, one with a servo, and a body in free fall.
+/// Two arms of two hinges each, one with a servo, and a free-falling body.
 const SCENE: &str = r#"<mujoco><option timestep="0.002"/><worldbody>
     <body><joint name="a" type="hinge" axis="0 1 0" damping="0.1"/><geom size="0.05" pos="0 0 -0.2" mass="1"/>
       <body pos="0 0 -0.4"><joint name="b" type="hinge" axis="0 1 0" damping="0.1"/><geom size="0.05" pos="0 0 -0.2" mass="0.5"/></body></body>
@@ -22,7 +22,7 @@ const SCENE: &str = r#"<mujoco><option timestep="0.002"/><worldbody>
     <sensor><jointpos name="qa" joint="a"/><jointpos name="qb" joint="b"/><jointpos name="qc" joint="c"/>
       <jointpos name="qd" joint="d"/></sensor></mujoco>"#;
 const NAMES: [&str; 4] = ["qa", "qb", "qc", "qd"];
-/// Rows of a log, and physics steps of each.
+/// Rows of a log, and physics steps per row.
 const ROWS: usize = 8;
 const STEPS: usize = 5;
 
@@ -72,7 +72,7 @@ fn one_push_of_each_island_tells_what_one_push_at_a_time_does() {
         touching: Vec::new(),
     };
     let (context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
-    // Six of the free body, two of each arm.
+    // Six coordinates of the free body, or two of each arm.
     assert_eq!(context.islands.slots(), 6);
     let walks = walk();
     let want = Derivatives {
@@ -92,9 +92,9 @@ fn one_push_of_each_island_tells_what_one_push_at_a_time_does() {
             (found.unwrap().remove(0), map.steps())
         };
         let ((whole, many), (apart, few)) = (linearised(false), linearised(true));
-        // 4 x 10 columns and the model as it is, and 4 x 6.
+        // 4 x 10 columns and the unperturbed model, compared with 4 x 6.
         assert!(few < many * 7 / 10, "{few} of {many}");
-        // Rounding, over steps of 1e-6 of the state and of 1e-3 N m.
+        // Rounding, over perturbations of 1e-6 of the state and of 1e-3 N m.
         assert!(largest_difference(&whole.a, &apart.a) < 1e-8);
         assert!(largest_difference(&whole.b, &apart.b) < 1e-11);
         assert!(largest_difference(&whole.jolt, &apart.jolt) < 1e-11);

@@ -1,6 +1,9 @@
-//! A position servo that gets its commands late, by a third of a period of its motion, integrated by hand. A drive that does not
-//! answer at all misses less of such a motion than one that answers too early, and that is no evidence for another unit. And servos that
-//! friction makes lag: that is no evidence for another clock.
+//! A position servo that gets its commands late by a third of a period of its motion, integrated by
+//! hand.
+//!
+//! A drive without any response has smaller residuals on such a motion than one that responds too
+//! early. That is no evidence for another unit. Servos that lag because of friction are no evidence
+//! for another clock.
 
 use std::fmt::Write as _;
 
@@ -24,13 +27,13 @@ const NOMINAL: &str = r#"<mujoco model="wrist"><option timestep="0.002" integrat
 /// Gains, N m/rad and N m s/rad, and the inertia about the joint, kg m².
 const GAINS: [f64; 2] = [20.0, 0.9];
 const INERTIA: f64 = 0.01 + 0.4 * 1e-4;
-/// How late the wrist's drive gets its commands, s: a third of a period of the motion.
+/// Delay of the wrist drive's commands, s: a third of a period of the motion.
 const DELAY: f64 = 0.05;
 const NOISE: f64 = 1e-3;
 const SECONDS: f64 = 3.0;
 const ROW: f64 = 0.01;
 
-/// Command of a drive at a time, at a pace of 1 or slower; zero before the log begins.
+/// Command of a drive at a time; zero before the log begins. A `pace` below 1 slows the motion.
 fn command(pace: f64, episode: usize, drive: usize, time: f64) -> f64 {
     let row = (time / ROW + 1e-9).floor();
     if row < 0.0 {
@@ -40,7 +43,8 @@ fn command(pace: f64, episode: usize, drive: usize, time: f64) -> f64 {
     0.2 * ((34.0 + k) * t).sin() + 0.1 * ((41.0 - k) * t + k).sin()
 }
 
-/// The two drives of the real machine: how late each gets its commands, s, and the friction that the model lacks, N m s/rad.
+/// The two drives of the real machine: delay of the commands, s, and the friction that the model
+/// lacks, N m s/rad.
 type Drives = [(f64, f64); 2];
 
 fn log(episode: usize, (drives, pace): (Drives, f64)) -> String {
@@ -63,7 +67,7 @@ fn log(episode: usize, (drives, pace): (Drives, f64)) -> String {
         for step in 0..steps {
             let now = time + h * f64::from(step);
             for (drive, (late, friction)) in drives.into_iter().enumerate() {
-                // Symplectic Euler, at a tenth of a millisecond.
+                // Symplectic Euler with a step of 0.1 ms.
                 let error = command(pace, episode, drive, now - late) - q[drive];
                 v[drive] += h / INERTIA * (GAINS[0] * error - (GAINS[1] + friction) * v[drive]);
                 q[drive] += h * v[drive];
@@ -73,7 +77,9 @@ fn log(episode: usize, (drives, pace): (Drives, f64)) -> String {
     text + "\n"
 }
 
-/// Faults of wiring that are named in logs of a machine with these drives that moves at a pace, with or without the state at the first row.
+/// Returns the wiring faults named in logs of a machine with these drives, which moves at a pace.
+///
+/// `starts` says whether the logs keep the state at the first row.
 fn faults(drives: Drives, pace: f64, starts: bool) -> Vec<(String, String)> {
     let folder = tempfile::tempdir().unwrap();
     let mass = "name = \"mass\"\ntarget = \"geom/hand/mass\"\nrange = [0.8, 1.2]";
@@ -94,7 +100,8 @@ fn a_drive_that_answers_late_is_not_accused_of_another_unit() {
     assert_eq!(faults([(DELAY, 0.0), (0.0, 0.0)], 1.0, true), []);
 }
 
-/// Servos of 20 N m/rad behind 1.6 N m s/rad lag by 80 ms, at periods of a second; where a log begins in motion nothing shows a dead time.
+/// Servos of 20 N m/rad with 1.6 N m s/rad lag by 80 ms, in a motion with periods of about one
+/// second. In a log that begins in motion no reading shows a dead time.
 #[test]
 fn servos_that_friction_makes_lag_are_not_taken_for_another_clock() {
     assert_eq!(faults([(0.0, 1.6); 2], 0.15, false), []);

@@ -1,5 +1,4 @@
-//! Diagnoses of a machine whose fault is known to the test alone, and how they fail when
-//! they should.
+//! Diagnoses of machines whose fault only the test knows, and how they fail when they should.
 
 #![allow(clippy::unwrap_used)]
 
@@ -62,13 +61,13 @@ use asid::diagnosis::windows;
 use diagnosis_support::engine;
 use world::{MASS, Truth, write_study};
 
-/// Whether the engine has contacts as exact as these tests ask for.
+/// Whether the engine has contacts that are exact enough for these tests.
 fn has_contacts() -> bool {
     let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
     engine().capabilities().contains(needed)
 }
 
-/// The verdict names these effects and no other.
+/// Asserts that the verdict names exactly these effects.
 #[track_caller]
 fn assert_names(result: &DiagnosisResult, effects: &[&str]) {
     assert_eq!(result.verdict.effects, effects, "{}", result.sentence);
@@ -91,11 +90,11 @@ fn run_on(folder: &Path, without: &[&str]) -> (Diagnosis, Work) {
     diagnose(&study, machine, settings, &Silent).unwrap()
 }
 
-/// Cases with the labels that a scorer would have.
+/// Cases with the labels of a scorer.
 const CASES: [(Truth, &[&str]); 5] = [
     (Truth::None, &[]),
     (Truth::Coulomb(1.2), &["coulomb-friction@rail"]),
-    // A drag on the cart is the same, and not what one thinks of first.
+    // Drag on the cart has the same effect, but is the less usual explanation.
     (Truth::Viscous(1.5), &["viscous-friction@rail"]),
     (Truth::Delay(0.03), &["actuator-delay@belt"]),
     (Truth::SensorBias(0.02), &["sensor-bias@x"]),
@@ -112,7 +111,7 @@ fn faults_are_named_and_closed() {
             "{truth:?}: {}",
             r.sentence
         );
-        // The model steps by 2 ms, which puts it about 2 deviations off the real cart.
+        // The model's step of 2 ms puts it about 2 standard deviations off the real cart.
         assert!(r.gap.refined < 2.5, "{truth:?}: {:?}", r.gap);
         if !effects.is_empty() {
             assert!(r.gap.closed.unwrap() > 0.95, "{truth:?}: {:?}", r.gap);
@@ -126,7 +125,7 @@ fn faults_are_named_and_closed() {
     }
 }
 
-/// Takes the states at the start out of the logs of a folder.
+/// Removes the initial states from the logs of a folder.
 fn forget_starts(folder: &Path) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -148,7 +147,8 @@ fn where_starts_are_open_friction_is_named_and_its_force_is_read_off_short_windo
     forget_starts(folder.path());
     let (diagnosis, work) = run_on(folder.path(), &[]);
     let r = &diagnosis.result;
-    // Whether it also falls from a breakaway value, starts that are open do not tell.
+    // Without initial states the logs do not show whether friction also falls from a breakaway
+    // value.
     let dry = ["coulomb-friction@rail", "stribeck-friction@rail"];
     let [named] = &r.verdict.effects[..] else {
         panic!("{}", r.sentence)
@@ -157,13 +157,13 @@ fn where_starts_are_open_friction_is_named_and_its_force_is_read_off_short_windo
     let bench = &work.bench;
     let rows = windows::rows(&bench.machine.plant, &bench.train.logs, &bench.open).unwrap();
     let record = windows::cut(&bench.machine.plant, &bench.train, rows);
-    // The mass is told apart from friction only together with it.
+    // The mass and the friction can only be identified together.
     let theta = [diagnosis.values[0]];
     let lacks = forces::missing(bench, &record, &[], &theta).unwrap();
     let [rail] = &lacks.joints[..] else {
         panic!("{lacks:?}")
     };
-    // In a window that holds a reversal the friction is partly one and partly the other.
+    // A window with a reversal has friction of both signs.
     let [against, error] = rail.against;
     assert!((0.7..1.3).contains(&against), "{rail:?}");
     assert!(error < 0.15 * against, "{rail:?}");
@@ -185,7 +185,7 @@ fn where_starts_are_open_friction_is_named_and_its_force_is_read_off_short_windo
 
 #[test]
 fn with_the_right_effect_out_of_the_catalogue_its_name_is_not_given() {
-    // Nothing else in the catalogue is a spring, and what comes nearest leaves a gap.
+    // No other effect of the catalogue is a spring, and the closest one leaves a gap.
     let (diagnosis, _) = run(Truth::Spring(15.0), &["joint-stiffness"]);
     let r = &diagnosis.result;
     assert!(
@@ -211,8 +211,8 @@ fn an_effect_of_no_catalogue_is_unknown() {
 
 #[test]
 fn noise_in_place_of_logs_is_no_effect() {
-    // Commands and readings of a machine that does not move: nothing is to be found, and
-    // the check of the excitation says why.
+    // The commands and readings are those of a machine that does not move. Nothing can be found,
+    // and the check of the excitation says why.
     let (diagnosis, _) = run(Truth::Noise, &[]);
     let r = &diagnosis.result;
     assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
@@ -230,7 +230,7 @@ fn the_same_study_gives_the_same_result_at_any_number_of_threads() {
         let machine = Machine::new(engine(), &study.scene, fixed, effects, threads).unwrap();
         let settings = Settings::default();
         let (diagnosis, _) = diagnose(&study, machine, settings, &Silent).unwrap();
-        // As it is written: a limit beyond what an effect can be is no number.
+        // As JSON: a limit beyond the range of an effect is not a number there.
         serde_json::to_value(diagnosis.result).unwrap()
     });
     assert_eq!(results[0], results[1]);

@@ -1,5 +1,6 @@
-//! The next experiment, for a cart on a rail that dry friction brakes: its commands, played by hand on the true machine, stay where the
-//! model's joint may go.
+//! The next experiment for a cart on a rail with dry friction.
+//!
+//! Its commands, played by hand on the true machine, stay within the range of the model's joint.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -16,12 +17,12 @@ use rand_chacha::ChaCha8Rng;
 use super::diagnosis_support::engine;
 use super::world::write_files;
 
-/// Dry friction, N, on a cart of 1 kg.
+/// Dry friction, N, of a cart of 1 kg.
 const FRICTION: f64 = 0.3;
 const NOISE: f64 = 2e-3;
 const ROW: f64 = 0.01;
 const SECONDS: f64 = 4.0;
-/// Room of the joint, relative to what the logs take.
+/// Range of the joint, relative to the travel in the logs.
 const ROOM: f64 = 1.6;
 
 fn model(range: &str) -> String {
@@ -35,7 +36,8 @@ fn model(range: &str) -> String {
     )
 }
 
-/// Positions of the true cart under commands that are held from row to row: symplectic Euler at a tenth of a millisecond.
+/// Positions of the true cart under commands that are held from row to row: symplectic Euler with a
+/// step of 0.1 ms.
 fn positions(time: &[f64], command: impl Fn(usize) -> f64) -> Vec<f64> {
     let (mut x, mut v) = (0.0_f64, 0.0_f64);
     let h = 1e-4;
@@ -44,7 +46,7 @@ fn positions(time: &[f64], command: impl Fn(usize) -> f64) -> Vec<f64> {
         let steps = ((time[k] - time[k - 1]) / h).round() as usize;
         for _ in 0..steps {
             let pushed = v + h * command(k - 1);
-            // Dry friction brings it to rest, and no further.
+            // Dry friction stops the cart but does not reverse it.
             let lost = (h * FRICTION).min(pushed.abs());
             v = pushed - lost.copysign(pushed);
             x += h * v;
@@ -61,7 +63,7 @@ fn log(episode: usize) -> String {
         .map(|k| ROW * k as f64)
         .collect();
     let phase = 0.3 * episode as f64;
-    // Cosines, so that the cart swings about a place and does not drift away.
+    // Cosines make the cart swing about one position without drift.
     let command = |k: usize| 3.0 * (5.0 * time[k]).cos() + (8.0 * time[k] + phase).cos();
     let x = positions(&time, command);
     let mut text = "time,ctrl.push,x,qpos.rail,qvel.rail".to_owned();
@@ -72,14 +74,14 @@ fn log(episode: usize) -> String {
     text + "\n"
 }
 
-/// Commands of the next experiment of a diagnosis of these logs in a model of the cart.
+/// Returns how the next experiment is made and its commands, from a diagnosis of these logs.
 fn proposed(range: &str, engine: Arc<dyn Backend>) -> (String, Episode) {
     let folder = tempfile::tempdir().unwrap();
     let mass = "name = \"mass\"\ntarget = \"geom/cart/mass\"\nrange = [0.8, 1.2]";
     write_files(folder.path(), &model(range), mass, log);
     let study = Study::read(folder.path()).unwrap();
     let machine = Machine::new(engine, &study.scene, &study.fixed, &study.effects, 0).unwrap();
-    // Faults of the sensor are told from friction by small motions, which stay where they are.
+    // Small motions tell sensor faults from friction, and would stay in place.
     let settings = Settings {
         without: ["sensor-scale", "sensor-drift"].map(String::from).into(),
         ..Settings::default()
@@ -91,13 +93,13 @@ fn proposed(range: &str, engine: Arc<dyn Backend>) -> (String, Episode) {
     (next.how, diagnosis.next_commands.expect("commands"))
 }
 
-/// How far the true cart gets from its start under some commands, m.
+/// Largest distance of the true cart from its initial position under some commands, m.
 fn furthest(commands: &Episode) -> f64 {
     let x = positions(&commands.time, |k| commands.ctrl[k]);
     x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
 }
 
-/// How far the cart gets in the logs, m.
+/// Largest distance of the cart in the logs, m.
 fn logged() -> f64 {
     let time: Vec<f64> = (0..400).map(|k| ROW * f64::from(k)).collect();
     let x = positions(&time, |k| {
@@ -106,7 +108,7 @@ fn logged() -> f64 {
     x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
 }
 
-/// Commands for a cart whose joint has a little more room than the logs take.
+/// Commands for a cart whose joint has slightly more range than the logs use.
 fn in_a_narrow_range(engine: Arc<dyn Backend>) -> Episode {
     let end = ROOM * logged();
     let range = format!("range=\"{} {end}\" limited=\"true\"", -end);
@@ -125,7 +127,8 @@ fn the_next_experiment_keeps_the_range_of_the_joint() {
     assert!(narrow.channels.is_empty() && narrow.ctrl.len() == narrow.time.len());
 }
 
-/// Symptom: on rapier the next experiment left the range. Cause: the range was asked of the engine, which has no such target there.
+/// Symptom: on rapier the next experiment leaves the range. Cause: the range is read from the
+/// engine, which has no such target there.
 #[test]
 fn the_next_experiment_keeps_a_range_that_the_engine_cannot_change() {
     let entry = find::<BackendEntry>("rapier").unwrap();

@@ -1,4 +1,4 @@
-//! A driven pendulum beside some that swing free, whose columns look like wiring that is wrong and are not.
+//! A driven pendulum beside free ones. Their columns resemble wiring faults and have none.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,15 +11,15 @@ use super::played::Player;
 use super::rows::write_model;
 use super::wiring::mended;
 
-/// Rows of a log, the time between them and a time step, s, and the deviation of a reading, rad.
+/// Rows of a log, time between them and time step, s, and standard deviation of a reading, rad.
 const ROWS: usize = 400;
 const ROW: f64 = 0.005;
 const STEP: f64 = 0.001;
 const NOISE: f64 = 1e-3;
-/// Rows by which a column is late: 60 ms.
+/// Delay of a column, rows: 60 ms.
 const LATE: usize = 12;
 
-/// A pendulum that a motor swings, and three that swing by themselves.
+/// One pendulum driven by a motor, and three free pendulums.
 const PENDULUMS: &str = r#"<mujoco model="pendulums"><compiler angle="radian"/><option timestep="0.001"/>
   <worldbody>
     <body name="driven"><joint name="driven" type="hinge" axis="0 1 0" damping="0.2"/>
@@ -36,14 +36,15 @@ const PENDULUMS: &str = r#"<mujoco model="pendulums"><compiler angle="radian"/><
     <jointpos name="q_c" joint="c"/></sensor>
 </mujoco>"#;
 
-/// What is wrong with the columns: rows by which each is late, and what the zero of the driven one is off by in all logs but the first, rad.
+/// Errors of the columns: delay of each, rows, and offset of the driven one's zero in all logs but
+/// the first, rad.
 #[derive(Clone, Copy, Default)]
 struct Wrong {
     late: [usize; 4],
     slips: f64,
 }
 
-/// A study whose logs give their starts.
+/// A study whose logs give their initial states.
 fn study(wrong: Wrong) -> Study {
     let folder = tempfile::tempdir().unwrap();
     write_logs(folder.path(), wrong);
@@ -86,7 +87,8 @@ fn write_logs(folder: &Path, Wrong { late, slips }: Wrong) {
     write_model(folder, PENDULUMS);
 }
 
-/// Those that swing free are late against the starts that the logs give, and say nothing of commands.
+/// Columns of the free pendulums are late relative to the initial states in the logs, and carry no
+/// information about commands.
 #[test]
 fn columns_that_no_drive_moves_are_late_by_no_clock() {
     if !has_contacts() {
@@ -99,7 +101,8 @@ fn columns_that_no_drive_moves_are_late_by_no_clock() {
     assert!(others.wiring.is_empty(), "{:?}", others.wiring);
 }
 
-/// As of an encoder that slips after the first log: another zero makes sense of the others, and nonsense of that one.
+/// As for an encoder that slips after the first log: another zero explains the other logs, and
+/// contradicts the first.
 #[test]
 fn a_zero_that_slips_once_is_no_wiring() {
     if !has_contacts() {

@@ -5,14 +5,17 @@ use std::fmt::Write as _;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Approximately normal numbers of deviation 1.
+/// Returns a source of approximately normal numbers with standard deviation 1.
 pub fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     move || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// A log of one joint that begins at rest at zero: `header`, then rows of time, command and angle, with `noise` of each reading. Rows are `row` s apart, over
-/// `seconds`, and `step` takes an angle, a speed and a command on over one of `steps` equal parts of a row.
+/// A log of one joint that begins at rest at zero.
+///
+/// After `header` its rows have time, command and angle, each angle with `noise`. Rows are `row` s
+/// apart, over `seconds`. `step` advances angle and speed under a command by one of `steps` equal
+/// parts of a row.
 pub fn joint_log(
     header: &str,
     [seconds, row]: [f64; 2],
@@ -26,8 +29,11 @@ pub fn joint_log(
     machine_log(header, ([seconds, row], steps), ([0.0; 2], "0,0"), machine)
 }
 
-/// A log of a machine: `header`, then rows of time, what `read` writes of a command and a state, and in the first row where it `begins`. Rows are `row` s apart,
-/// over `seconds`, and `step` takes a state and a command on over one of `steps` equal parts of a row.
+/// A log of a machine with any state.
+///
+/// After `header` its rows have the time and what `read` writes of a command and a state. The first
+/// row also has the initial state, `begins`. Rows are `row` s apart, over `seconds`. `step`
+/// advances the state under a command by one of `steps` equal parts of a row.
 pub fn machine_log<S, U>(
     header: &str,
     ([seconds, row], steps): ([f64; 2], u32),

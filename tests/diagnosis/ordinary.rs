@@ -1,11 +1,12 @@
-//! A machine that is as its model says, but for what every machine has: nothing of it stands out, and what does is named alone.
+//! A machine that matches its model except for ordinary tolerances. No tolerance stands out, and a
+//! larger effect is named alone.
 
 use asid::diagnosis::result::Kind;
 
 use super::world::Truth;
 use super::{assert_names, run};
 
-/// Laws that were fitted within their tolerances.
+/// Laws that are fitted within their tolerances.
 fn laws(result: &asid::diagnosis::result::DiagnosisResult) -> Vec<&str> {
     result.tolerances.iter().map(|t| &*t.effect).collect()
 }
@@ -38,7 +39,7 @@ fn what_stands_out_beside_tolerances_is_named_alone() {
 
 #[test]
 fn more_friction_than_an_ordinary_joint_has_is_named() {
-    // 75 % more than the model has, where 30 % are three deviations.
+    // 75 % more than the model has; three standard deviations of the tolerance are 30 %.
     let (found, _) = run(Truth::Viscous(1.5), &[]);
     assert_eq!(found.result.verdict.effects, ["viscous-friction@rail"]);
     assert!(found.result.tolerances.is_empty());

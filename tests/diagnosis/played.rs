@@ -1,10 +1,10 @@
-//! A real machine that is a scene which the engine plays.
+//! A real machine that is a scene simulated by the engine.
 
 use asid::core::{BatchConfig, Control, Recording, Rollout, Scene, Simulator};
 
 use crate::diagnosis_support::engine;
 
-/// A scene, ready to be played and read.
+/// A simulation of a scene, with the sensors that are read.
 pub struct Player {
     simulator: Box<dyn Simulator>,
     recording: Recording,
@@ -12,7 +12,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// Plays a scene, and reads some sensors every row; the row and a time step in seconds.
+    /// Loads a scene to read some sensors in every row; row and time step are in seconds.
     pub fn of(xml: &str, sensors: &[&str], [row, step]: [f64; 2]) -> Self {
         let scene = Scene::from_xml("machine", xml, &[]).unwrap();
         let model = engine().load(&scene).unwrap();
@@ -28,7 +28,10 @@ impl Player {
         }
     }
 
-    /// Readings (`rows x width`) from a start on: its own first, and then at the end of each row under the commands of that (`rows - 1 x actuators`).
+    /// Returns readings (`rows x width`) from an initial state on.
+    ///
+    /// The first row reads the initial state. Each further row is read at the end of a row of
+    /// `commands` (`rows - 1 x actuators`).
     pub fn play(
         &mut self,
         (qpos, qvel): (&[f64], &[f64]),

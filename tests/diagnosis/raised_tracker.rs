@@ -1,6 +1,6 @@
-//! A ball that is dropped on a floor, and a tracker whose zero lies above it.
+//! A ball that is dropped on a floor, with a tracker that reads too high.
 //!
-//! Along its readings the ball floats over the floor and never touches it.
+//! Along its readings the ball floats above the floor and never touches it.
 
 use std::path::Path;
 
@@ -11,13 +11,13 @@ use super::played::Player;
 use super::rows::{write_log, write_model};
 use super::{assert_names, has_contacts, run_on};
 
-/// Rows of a log, the time between them and a time step, s, and the deviation of a reading, m.
+/// Rows of a log, time between them and time step, s, and standard deviation of a reading, m.
 const ROWS: usize = 60;
 const ROW: f64 = 0.02;
 const STEP: f64 = 0.001;
 const NOISE: f64 = 0.003;
 const EPISODES: usize = 6;
-/// How far above the ball the tracker sees it, m.
+/// Height of the tracker's reading above the ball, m.
 const OFF: f64 = 0.04;
 
 const SCENE: &str = r#"<mujoco model="ball"><option timestep="0.001" integrator="implicitfast" cone="elliptic"/>
@@ -45,7 +45,8 @@ fn write_study(folder: &Path) {
     write_model(folder, SCENE);
 }
 
-/// What seems to float on the readings rests on the floor in replays, and is taken in segments.
+/// The ball seems to float along the readings, but touches the floor in replays. It is therefore
+/// treated in segments.
 #[test]
 fn a_ball_that_its_tracker_sees_above_the_floor_touches_it() {
     if !has_contacts() {
@@ -59,7 +60,8 @@ fn a_ball_that_its_tracker_sees_above_the_floor_touches_it() {
     assert!((found - OFF).abs() < 0.001, "{found}");
 }
 
-/// Along segments the steps of slopes are made smaller where they change much; of no candidate there is no step.
+/// Along segments, columns that change the readings much get smaller steps. Without candidates
+/// there is no such step.
 #[test]
 fn a_search_upon_the_only_effect_that_it_may_name_ends_without_a_candidate() {
     if !has_contacts() {

@@ -1,7 +1,8 @@
-//! A wrist behind a stiff servo, integrated by hand, with dry and viscous friction that the model lacks: the commonest finding on real arms.
+//! A wrist behind a stiff servo, integrated by hand. The model lacks dry and viscous friction, the
+//! commonest finding on real arms.
 //!
-//! The joint hardly weighs anything, so that its speed is as rough as the force that is missing: a screening about that trajectory is led by an
-//! inertia, and both frictions are far behind it.
+//! The joint is light, so its smoothed speed is as rough as the missing force. An inertia leads the
+//! screening about that trajectory, and both frictions are far behind it.
 
 use super::one_joint::{joint_log, normal};
 use super::run_on;
@@ -14,11 +15,12 @@ const NOMINAL: &str = r#"<mujoco model="wrist"><option timestep="0.001" integrat
   <sensor><jointpos name="angle" joint="roll"/></sensor>
 </mujoco>
 "#;
-/// Inertia with the rotor's, kg m².
+/// Inertia including the rotor's, kg m².
 const INERTIA: f64 = 0.01 + 0.4 * 0.3 * 0.02 * 0.02;
 /// Stiffness and damping of the servo, N m/rad and N m s/rad, and its limit, N m.
 const SERVO: (f64, f64, f64) = (25.0, 1.5, 8.0);
-/// Friction of the model, and what it lacks: N m s/rad, and dry, N m.
+/// Viscous friction of the model, missing viscous friction, N m s/rad, and missing dry friction, N
+/// m.
 const DAMPING: f64 = 0.2;
 const VISCOUS: f64 = 0.3;
 const DRY: f64 = 0.15;
@@ -34,7 +36,8 @@ fn command(episode: usize, time: f64) -> f64 {
     wave(0.2, 2.1 + 0.3 * k, 0.9 * k) + wave(0.15, 6.1 - 0.3 * k, 2.0 * k)
 }
 
-/// Angle and speed after a step of `h`: symplectic Euler, with dry friction that stops what it can stop.
+/// Angle and speed after a step of `h`: symplectic Euler, with dry friction that stops but does not
+/// reverse the motion.
 fn step([q, v]: [f64; 2], command: f64, h: f64) -> [f64; 2] {
     let (kp, kv, limit) = SERVO;
     let servo = (kp * (command - q) - kv * v).clamp(-limit, limit);
@@ -51,7 +54,8 @@ fn log(episode: usize) -> String {
     joint_log(header, [SECONDS, ROW], 100, machine, || NOISE * noise())
 }
 
-/// While the servo keeps within its limit its damping is the same as the joint's: the logs cannot tell which of them it is.
+/// Within the servo's limit, its damping is equivalent to that of the joint. The logs cannot tell
+/// the two apart.
 #[test]
 fn dry_friction_behind_a_stiff_servo_is_named_with_what_damps_beside_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Slopes of a row in the state and in values, by all its physics steps and by one of them.
+//! Derivatives of a row with respect to state and values, from all its physics steps and from one
+//! of them.
 
 use asid::core::episode::ChannelColumns;
 use asid::core::parameter::Scale;
@@ -15,14 +16,14 @@ use asid::effects::EffectSpec;
 
 use crate::diagnosis_support::engine;
 
-/// Rows of a log, physics steps of each, and their duration, s.
+/// Rows of a log, physics steps per row, and their duration, s.
 const ROWS: usize = 20;
 const STEPS: usize = 10;
 const DT: f64 = 0.002;
 /// Mass, kg, stiffness, N/m, and damping, N s/m, of a slide.
 const SLIDE: [f64; 3] = [2.0, 8.0, 1.0];
 
-/// A slide on a spring, with a servo that pulls with `kp` (N/m) and at most `force` (N).
+/// A slide on a spring, with a servo of stiffness `kp` (N/m) and a limit of `force` (N).
 fn scene(kp: f64, force: f64) -> Scene {
     let [mass, stiffness, damping] = SLIDE;
     let xml = format!(
@@ -36,7 +37,7 @@ fn scene(kp: f64, force: f64) -> Scene {
     Scene::from_xml("slide", &xml, &[]).unwrap()
 }
 
-/// A log in which the slide moves back and forth while it is commanded to one side.
+/// A log in which the slide oscillates under a constant command to one side.
 fn logs(machine: &Machine) -> Logs {
     let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
     let episode = Episode {
@@ -57,7 +58,7 @@ fn machine(scene: &Scene) -> Machine {
     Machine::new(engine(), scene, &[], &[], 1).unwrap()
 }
 
-/// The log of a machine, linearised with some effects by one step of each row or by all.
+/// The log of a machine with some effects, linearised from one step of each row or from all.
 fn linearised(machine: &Machine, specs: &[EffectSpec], one_step: bool) -> LinearEpisode {
     let logs = logs(machine);
     let walks = [Walk::new(&logs, 0, DT)];
@@ -77,7 +78,7 @@ fn states() -> Vec<f64> {
     (0..ROWS).flat_map(state).collect()
 }
 
-/// Largest difference of two lists of as many numbers.
+/// Largest absolute difference of two lists of the same length.
 pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let each = a.iter().zip(b).map(|(a, b)| (a - b).abs());
@@ -88,7 +89,7 @@ pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 fn slopes_of_an_oscillator_are_those_of_its_solution_either_way() {
     let machine = machine(&scene(0.0, 1.0));
     let [mass, stiffness, damping] = SLIDE;
-    // Of the damped oscillator.
+    // Natural frequency and decay rate of the damped oscillator.
     let (square, decay) = (stiffness / mass, 0.5 * damping / mass);
     let rate = (square - decay * decay).sqrt();
     let time = STEPS as f64 * DT;
@@ -101,15 +102,17 @@ fn slopes_of_an_oscillator_are_those_of_its_solution_either_way() {
     ];
     let want = row.map(|x| (-decay * time).exp() * x).repeat(ROWS - 1);
     let [whole, one] = [false, true].map(|one| linearised(&machine, &[], one));
-    // The integrator is of first order: half a step of the acceleration's slope.
+    // The integrator is of first order: its error is half a step of the acceleration's derivative.
     assert!(largest_difference(&whole.a, &want) < 0.5 * DT * stiffness / mass);
     assert!(largest_difference(&whole.a, &one.a) < 1e-6);
     assert_eq!(whole.defect, one.defect);
     assert_eq!(whole.residual, one.residual);
 }
 
-/// What a unit of damping (N s/m) changes of each row's end, `rows x 2`: by all steps of the row; by one of them, with fresh slopes in the state;
-/// and with slopes that were kept.
+/// Change of each row's end per unit of damping (N s/m), `rows x 2`.
+///
+/// The three results are from all steps of a row, from one step with new state derivatives, and
+/// from one step with kept state derivatives.
 fn columns_of_damping() -> [Vec<f64>; 3] {
     let machine = machine(&scene(0.0, 1.0));
     let logs = logs(&machine);
@@ -147,7 +150,7 @@ fn columns_of_damping() -> [Vec<f64>; 3] {
     let again = map
         .linearise_anew(&theta, &states, kept, &[], &varied)
         .unwrap();
-    // All steps of the model as it is, and one a row of the other.
+    // All steps of the unperturbed model, and one step per row of the other.
     let steps = (ROWS - 1) * (STEPS + 1);
     assert_eq!(map.steps() - before, steps as u64);
     [whole, one, again].map(|mut found| found.remove(0).state_columns)
@@ -156,7 +159,8 @@ fn columns_of_damping() -> [Vec<f64>; 3] {
 #[test]
 fn what_a_value_changes_in_one_step_is_carried_over_the_row() {
     let [whole, one, again] = columns_of_damping();
-    // Damping takes v / m off the speed in each second, and the speed turns by 2 rad/s: over the row to second order in 0.04.
+    // Damping decelerates by v / m, and the motion turns by 2 rad/s. Over a row of 0.02 s this
+    // holds to second order in 0.04.
     let largest = whole.iter().copied().map(f64::abs).fold(0.0, f64::max);
     assert!((largest / (0.3 / SLIDE[0] * STEPS as f64 * DT) - 1.0).abs() < 0.1);
     assert!(largest_difference(&whole, &one) < 0.002 * largest);
@@ -197,7 +201,7 @@ fn what_acts_on_readings_alone_is_read_and_not_stepped() {
     }
 }
 
-/// Whether one step tells the slopes of a row, of a machine with some effects.
+/// Whether one physics step gives the derivatives of a row, for a machine with some effects.
 fn tells(machine: &Machine, specs: &[EffectSpec]) -> bool {
     let logs = logs(machine);
     let taken = Taken {
@@ -219,7 +223,7 @@ fn friction_is_told_by_one_step_while_it_slides_and_not_where_it_stops_within_a_
         let friction = format!("coulomb-friction@slide:force={force}");
         tells(&machine, &[friction.parse().unwrap()])
     };
-    // A slide of 2 kg at 0.3 m/s is stopped by 20 N within 0.03 s, and rows are 0.02 s.
+    // 20 N stop a slide of 2 kg with 0.3 m/s within 0.03 s, and rows are 0.02 s long.
     assert!(tells(0.02));
     assert!(!tells(20.0));
 }
@@ -232,7 +236,7 @@ fn a_reading_that_drifts_has_the_slopes_of_one_that_does_not() {
     for one in [false, true] {
         let drifting = linearised(&machine, std::slice::from_ref(&drift), one);
         assert!(largest_difference(&drifting.h, &plain.h) < 1e-6);
-        // 0.5 times the time of each row, less than which is read.
+        // The drift of 0.5 times the time of each row is subtracted from the residual.
         let time = |k: usize| (k * STEPS) as f64 * DT;
         let pairs = plain.residual.iter().zip(&drifting.residual).enumerate();
         for (k, (plain, drifting)) in pairs {
@@ -248,7 +252,8 @@ fn what_a_sensor_remembers_is_of_the_time_that_passes_and_takes_no_steps() {
     let found = linearised(&machine, &[late], false);
     let nx = 2;
     for row in found.h.chunks_exact(nx).skip(2) {
-        // 5 ms late, less than half a row: the place of then is the present one less 5 ms of the speed.
+        // A delay of 5 ms, less than half a row: the delayed position is the present one minus 5 ms
+        // of the speed.
         assert!((row[0] - 1.0).abs() < 1e-6, "{row:?}");
         assert!((row[1] + 0.005).abs() < 1e-6, "{row:?}");
     }
@@ -258,11 +263,13 @@ fn what_a_sensor_remembers_is_of_the_time_that_passes_and_takes_no_steps() {
 fn a_soft_machine_is_told_by_one_step_and_one_that_settles_within_a_row_is_not() {
     let tells = |kp: f64, force: f64| tells(&machine(&scene(kp, force)), &[]);
     assert!(tells(50.0, 100.0));
-    // 300 rad/s, and far from its target at full force.
+    // The servo has 300 rad/s, and is far from its target at full force.
     assert!(!tells(2e5, 100.0));
 }
 
-/// Of two segments, the first of which is blind to some coordinates of its start: what a linearisation finds, and its physics steps.
+/// Linearises two segments; returns the result and its physics steps.
+///
+/// The first segment is `blind` to some coordinates of its initial state.
 fn segments(blind: &[Vec<bool>]) -> (Vec<LinearEpisode>, u64) {
     let machine = machine(&scene(0.0, 1.0));
     let logs = logs(&machine);
@@ -296,7 +303,7 @@ fn a_coordinate_that_a_segment_is_blind_to_takes_no_simulation_and_others_stay()
     for (whole, some) in whole[0].h.chunks(2).zip(some[0].h.chunks(2)) {
         assert_eq!([whole[0], 0.0], some[..]);
     }
-    // The place starts at cos(w t) of itself, so that it is seen.
+    // The position depends on its initial value by cos(w t), so the readings show it.
     assert!(whole[0].h[2 * 2] > 0.9);
     assert_eq!(steps - fewer, ((ROWS - 1) * STEPS) as u64);
 }

@@ -1,4 +1,4 @@
-//! Logs that tests simulate, as files.
+//! Writes simulated logs as files.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,8 +6,10 @@ use std::path::Path;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Writes the log of an episode, the last of so many to be held out: its columns after the time, some places of each row (`rows x width`) with noise of
-/// a deviation by the episode's own seed, and the start in the first row.
+/// Writes the log of an episode; the last of `episodes` is held out.
+///
+/// `columns` are the columns after the time. Each row has `places` (`rows x width`) with noise of a
+/// standard deviation, seeded by the episode. The first row also has the initial state, `start`.
 pub fn write_log(
     folder: &Path,
     (episode, episodes): (usize, usize),
@@ -21,7 +23,7 @@ pub fn write_log(
     for (row, place) in places.chunks(width).enumerate() {
         write!(text, "{:.2}", row as f64 * seconds).unwrap();
         for x in place {
-            // The sum of twelve uniform numbers is normal enough.
+            // The sum of twelve uniform numbers is approximately normal.
             let normal = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
             write!(text, ",{}", x + noise * normal).unwrap();
         }
@@ -36,18 +38,18 @@ pub fn write_log(
     write_episode(folder, (episode, episodes - 1), &text);
 }
 
-/// Writes the text of an episode's log; those from so many on are held out.
+/// Writes the text of an episode's log; episodes from `training` on are held out.
 pub fn write_episode(folder: &Path, (episode, training): (usize, usize), text: &str) {
     let part = if episode < training { "train" } else { "test" };
     std::fs::write(folder.join(format!("{part}_{episode}.csv")), text).unwrap();
 }
 
-/// Writes the model, and the study of such logs.
+/// Writes the model, and a study of such logs.
 pub fn write_model(folder: &Path, xml: &str) {
     write_model_with(folder, xml, "");
 }
 
-/// The same of a study that has parameters.
+/// Writes the model, and a study with parameters.
 pub fn write_model_with(folder: &Path, xml: &str, parameters: &str) {
     std::fs::write(folder.join("nominal.xml"), xml).unwrap();
     let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";

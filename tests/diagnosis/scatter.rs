@@ -1,4 +1,4 @@
-//! What replays of a segment scatter by.
+//! The scatter of replays of a segment.
 
 use asid::core::episode::ChannelColumns;
 use asid::core::{Episode, Scene};
@@ -12,16 +12,16 @@ use asid::diagnosis::machine::Machine;
 
 use crate::diagnosis_support::engine;
 
-/// Rows of a log, their physics steps, and the duration of a step, s.
+/// Rows of a log, physics steps per row, and duration of a step, s.
 const ROWS: usize = 20;
 const STEPS: usize = 10;
 const DT: f64 = 0.002;
-/// Deviation of a reading, m.
+/// Standard deviation of a reading, m.
 const NOISE: f64 = 1e-3;
-/// Where the slide begins, m, its speed, m/s, and its acceleration, m/s².
+/// Initial position, m, initial speed, m/s, and acceleration, m/s², of the slide.
 const START: [f64; 3] = [0.01, 0.3, 0.5];
 
-/// A slide that moves freely but for what `joint` says of it, pulled by a constant acceleration.
+/// A slide under constant acceleration, free but for the attributes `joint`.
 fn slide(joint: &str) -> Machine {
     let acceleration = START[2];
     let xml = format!(
@@ -34,7 +34,7 @@ fn slide(joint: &str) -> Machine {
     Machine::new(engine(), &scene, &[], &[], 1).unwrap()
 }
 
-/// The log of it without a stop, with no noise.
+/// Its log without a stop and without noise.
 fn logs(machine: &Machine) -> Logs {
     let [place, speed, acceleration] = START;
     let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
@@ -62,8 +62,10 @@ fn segment(logs: &Logs) -> Vec<Walk> {
     }]
 }
 
-/// Scatter of a slide with some `joint`, as one segment: power of each row in units of the noise, of draws and of half the time step, with the share
-/// of rows that is lost.
+/// Scatter of a slide with the attributes `joint`, as one segment.
+///
+/// Returns the power of each row in units of the noise, from draws and from half the time step, and
+/// the share of rows that is lost.
 fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
     let machine = slide(joint);
     let logs = logs(&machine);
@@ -99,7 +101,8 @@ fn a_motion_that_is_linear_in_its_start_scatters_by_the_integrator_alone() {
     let [_, _, acceleration] = START;
     for (k, [draws, integrator]) in rows.into_iter().enumerate() {
         assert!(draws < 1e-10, "{k}: {draws}");
-        // The semi-implicit Euler method is a t dt / 2 ahead, half of which goes with half the step; three tenths of that are a segment's own.
+        // Semi-implicit Euler is ahead by a t dt / 2, and half of that vanishes at half the step. A
+        // segment on its own gets 0.3 times that change.
         let time = (k * STEPS) as f64 * DT;
         let own = 0.3 * 0.25 * acceleration * time * DT / NOISE;
         assert!((integrator - own * own).abs() < 1e-6, "{k}: {integrator}");
@@ -109,7 +112,7 @@ fn a_motion_that_is_linear_in_its_start_scatters_by_the_integrator_alone() {
 
 #[test]
 fn behind_a_stop_replays_scatter_and_before_it_they_do_not() {
-    // At 0.06 m, which is reached after 0.15 s.
+    // The stop at 0.06 m is reached after 0.15 s.
     let (rows, lost) = scatter(r#"range="-1 0.06" limited="true""#);
     for (k, [draws, _]) in rows.iter().enumerate().take(6) {
         assert!(*draws < 0.01, "{k}: {draws}");
@@ -124,7 +127,8 @@ fn a_replay_ends_where_it_leaves_more_than_is_asked_of_it() {
     let logs = logs(&machine);
     let walks = segment(&logs);
     let mut map = StepMap::new(&machine, &[], &[], (&logs, &walks), 1).unwrap();
-    // A start that is off by three deviations is off by as much in every row, but for the integrator's error of 0.1 deviations at the end.
+    // An initial position off by three standard deviations stays that far off in every row. The
+    // integrator's error is 0.1 standard deviations at the end.
     let [place, speed, _] = START;
     let first = [place + 3.0 * NOISE, speed];
     let begun = [&first[..], &[f64::NAN; 2 * (ROWS - 1)]].concat();
@@ -138,7 +142,7 @@ fn a_replay_ends_where_it_leaves_more_than_is_asked_of_it() {
     assert!((whole / (9.0 * ROWS as f64) - 1.0).abs() < 0.1, "{whole}");
     assert_eq!(rows, ROWS);
     assert_eq!(roll(Some(1.001 * whole)), (whole, ROWS));
-    // A third of the rows leave a third of it.
+    // A third of the rows accumulates a third of the total.
     let (left, rows) = roll(Some(whole / 3.0));
     assert_eq!(left, f64::INFINITY);
     assert!(rows.abs_diff(ROWS / 3) <= 2, "{rows}");

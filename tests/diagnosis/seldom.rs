@@ -1,4 +1,5 @@
-//! A machine that touches in some of its logs alone: a plunger above a floor, and a slide beside it that drags.
+//! A machine with contact in only some of its logs: a plunger above a floor, and a slide with
+//! friction beside it.
 
 use std::path::Path;
 
@@ -6,18 +7,19 @@ use super::played::Player;
 use super::rows::{write_log, write_model};
 use super::{has_contacts, run_on};
 
-/// Rows of a log, time between them and of a step, s.
+/// Rows of a log, time between them and time step, s.
 const ROWS: usize = 80;
 const ROW: f64 = 0.02;
 const STEP: f64 = 0.001;
-/// Deviation of a reading, m.
+/// Standard deviation of a reading, m.
 const NOISE: f64 = 1e-3;
-/// Logs, of which the last is held out.
+/// Number of logs; the last is held out.
 const EPISODES: usize = 8;
-/// Height from which the plunger falls in each, m: along every third log to train on it touches nothing, for it is thrown up from far above.
+/// Height from which the plunger falls in each log, m. In every third training log it begins so far
+/// above the floor that it touches nothing.
 const HEIGHT: [f64; EPISODES] = [0.3, 30.0, 0.35, 0.4, 30.0, 0.45, 0.5, 0.38];
 
-/// Both slides, with so much viscous friction of the second, N s/m.
+/// Both slides; the second has the viscous friction `damping`, N s/m.
 fn scene(damping: f64) -> String {
     format!(
         r#"<mujoco model="plunger"><option timestep="{STEP}"/><worldbody>
@@ -42,8 +44,10 @@ fn write_study(folder: &Path, damping: f64) {
     write_model(folder, &scene(0.0));
 }
 
-/// All candidates are first tried along each third log. Nothing touches in these, so that columns of both slides could be told apart by slopes in forces
-/// there, and no other log had such slopes: a study of a finger ended in a panic.
+/// The screening first uses every third log, and these have no contact.
+///
+/// Guards against columns of both slides separated by force derivatives that only these logs have.
+/// The mismatch with the other logs caused a panic.
 #[test]
 fn a_part_of_the_logs_without_contact_is_walked_as_the_others_are() {
     if !has_contacts() {
@@ -52,7 +56,7 @@ fn a_part_of_the_logs_without_contact_is_walked_as_the_others_are() {
     let folder = tempfile::tempdir().unwrap();
     write_study(folder.path(), 0.5);
     let result = run_on(folder.path(), &[]).0.result;
-    // A drag of the cart is the same.
+    // Drag on the cart has the same effect.
     let names = ["viscous-friction@rail", "linear-drag@cart"];
     assert!(
         names.contains(&&*result.verdict.effects[0]),

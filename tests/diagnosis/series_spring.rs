@@ -1,4 +1,4 @@
-//! A servo that pulls its pendulum through a spring, integrated by hand, and logs that begin in the middle of a motion.
+//! A servo that drives its pendulum through a spring, integrated by hand. Logs begin in mid-motion.
 
 use super::one_joint::{machine_log, normal};
 use super::world::write_files;
@@ -22,7 +22,7 @@ const DAMPING: f64 = 0.03;
 const ROTOR: f64 = 0.004;
 /// Gains of the servo, N m/rad and N m s/rad.
 const GAINS: [f64; 2] = [8.0, 0.25];
-/// Deviation of a reading, rad.
+/// Standard deviation of a reading, rad.
 const NOISE: f64 = 3e-3;
 const SECONDS: f64 = 3.3;
 const ROW: f64 = 0.01;
@@ -51,19 +51,21 @@ fn log(episode: usize) -> String {
     let read = |u: &f64, state: &[f64; 4]| format!("{u},{}", state[0] + NOISE * noise());
     let advance = |state, u: &f64, h| step(state, *u, h);
     let machine = (|time| command(episode, time), read, advance);
-    // Its rotor is where the joint is, and goes with it.
+    // The rotor begins at the position and speed of the joint.
     let begins = ([q, v, q, v], &*format!("{q},{v}"));
     machine_log(header, ([SECONDS, ROW], 1000), begins, machine)
 }
 
-/// A model begins with its rotor in balance between servo and spring: the spring would be stretched by up to a tenth, whose swing is the first second.
+/// A model begins with its rotor in balance between servo and spring. The spring would be stretched
+/// by up to 0.1 rad there, and its oscillation fills the first second.
 #[test]
 fn a_spring_in_series_is_named_where_no_log_says_how_far_it_is_stretched() {
     let folder = tempfile::tempdir().unwrap();
     write_files(folder.path(), NOMINAL, STUDY, log);
     let r = run_on(folder.path(), &[]).0.result;
     assert_names(&r, &["joint-compliance@hinge"]);
-    // Its damping is the model's guess, and its stretch is open: the logs tell it to a quarter.
+    // The spring's damping is the model's guess, and its initial stretch is unknown. The logs
+    // determine the compliance to a quarter.
     let [low, high] = r.effects[0].intervals95["compliance"];
     assert!(low < COMPLIANCE && COMPLIANCE < high, "{low} {high}");
     assert!(high - low < 0.6 * COMPLIANCE, "{low} {high}");

@@ -1,5 +1,7 @@
-//! Servos integrated by hand: one with play between its rotor, which no sensor reads, and its link, and two of which one has another zero at each
-//! log beside a spring at the other.
+//! Two servos, integrated by hand.
+//!
+//! In one study the first has play between its rotor, which no sensor reads, and its link. In the
+//! other, the second's sensor has another zero in each log, and the first has a spring.
 
 use std::fmt::Write as _;
 
@@ -9,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::world::write_files;
 use super::{assert_names, run_on};
 
-/// Two servos that do not move each other.
+/// Two uncoupled servos.
 const NOMINAL: &str = r#"<mujoco model="servos"><option timestep="0.002" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody>
     <body name="left"><joint name="left" type="hinge" axis="0 0 1" damping="0.2"/>
@@ -21,25 +23,25 @@ const NOMINAL: &str = r#"<mujoco model="servos"><option timestep="0.002" integra
   <sensor><jointpos name="q_left" joint="left"/><jointpos name="q_right" joint="right"/></sensor>
 </mujoco>
 "#;
-/// Inertia of the joints, kg m², and their friction, N m s/rad.
+/// Inertia of the joints, kg m², and their viscous friction, N m s/rad.
 const INERTIA: [f64; 2] = [0.05, 0.5];
 const DAMPING: f64 = 0.2;
-/// Stiffness, N m/rad, and damping of a servo, N m s/rad.
+/// Stiffness, N m/rad, and damping, N m s/rad, of a servo.
 const KP: f64 = 30.0;
 const KV: f64 = 1.5;
-/// Deviation of a reading, rad.
+/// Standard deviation of a reading, rad.
 const NOISE: f64 = 1e-3;
 const SECONDS: f64 = 3.0;
 const ROW: f64 = 0.01;
 
-/// What is behind the left joint, and what its right neighbour's sensor says.
+/// Faults of the left joint and of the right sensor.
 #[derive(Clone, Copy)]
 struct Truth {
     /// Play between the left drive and its joint, rad.
     play: f64,
-    /// Of a spring at the left joint, N m/rad.
+    /// Stiffness of a spring at the left joint, N m/rad.
     stiffness: f64,
-    /// By how much the zero of the right sensor moves from one log to the next, rad.
+    /// Change of the right sensor's zero from one log to the next, rad.
     trend: f64,
 }
 
@@ -54,8 +56,10 @@ fn command(episode: usize, joint: usize, time: f64) -> f64 {
     0.5 * ((3.0 + 0.4 * k + 0.7 * j) * time).sin() + 0.3 * ((9.0 - 0.5 * k + j) * time + k).sin()
 }
 
-/// Position, speed and rotor of a joint after a step of `h` with a command: symplectic Euler, the massless rotor by backward Euler. Within the play
-/// it follows its command, and at an end of it pushes.
+/// Position, speed and rotor of a joint after a step of `h` with a command.
+///
+/// The joint uses symplectic Euler, the massless rotor backward Euler. Within the play the rotor
+/// follows its command; at an end of the play it pushes the joint.
 fn step([q, v, rotor]: [f64; 3], (command, inertia): (f64, f64), truth: Truth, h: f64) -> [f64; 3] {
     let free = (KV * rotor + h * KP * command) / (KV + h * KP);
     let ahead = free - q;
@@ -102,7 +106,8 @@ fn diagnosed(truth: Truth) -> asid::diagnosis::result::DiagnosisResult {
     run_on(folder.path(), &[]).0.result
 }
 
-/// Where a joint is placed on a reading, its hidden rotor goes along: a rigid end of the play would feel a milliradian of noise as a blow.
+/// When a joint is set to a reading, its hidden rotor moves with it. Otherwise a rigid end of the
+/// play would turn a milliradian of noise into an impact.
 #[test]
 fn play_behind_a_servo_is_named_with_its_width() {
     let r = diagnosed(Truth {
@@ -114,8 +119,9 @@ fn play_behind_a_servo_is_named_with_its_width() {
     assert!((width / 0.04 - 1.0).abs() < 0.1, "{width}");
 }
 
-/// The sensor comes first by its evidence, closes less than half of the gap, and makes up for all of the force that is missing at its joint: hardly any of
-/// what is missing beside a spring.
+/// The sensor has the highest evidence and makes up for all of the force that is missing at its
+/// joint, but closes less than half of the gap. Next to the spring that force is hardly any of the
+/// missing power.
 #[test]
 fn a_cause_beside_a_spring_that_lacks_far_more_force_is_named_too() {
     let r = diagnosed(Truth {

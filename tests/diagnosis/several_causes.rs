@@ -8,14 +8,14 @@ use super::played::Player;
 use super::rows::{write_episode, write_model};
 use super::{has_contacts, run_on};
 
-/// Rows of a log, the time between them and a time step, s.
+/// Rows of a log, time between them and time step, s.
 const ROWS: usize = 240;
 const ROW: f64 = 0.01;
 const STEP: f64 = 0.001;
-/// Logs, of which three are held out.
+/// Number of logs; three of them are held out.
 const EPISODES: usize = 9;
 
-/// A pendulum on a position servo, and the deviation of a reading, rad.
+/// A pendulum on a position servo, and the standard deviation of its reading, rad.
 const SERVO: &str = r#"<mujoco model="servo"><compiler angle="radian"/><option timestep="0.001" integrator="implicitfast"/>
   <worldbody><body name="link" pos="0 0 0.5"><joint name="hinge" type="hinge" axis="0 1 0" damping="0.03" armature="0.004"/>
     <geom name="link" type="capsule" fromto="0 0 0 0 0 -0.2" size="0.01" mass="0.08" contype="0" conaffinity="0"/>
@@ -25,7 +25,7 @@ const SERVO: &str = r#"<mujoco model="servo"><compiler angle="radian"/><option t
 </mujoco>"#;
 const ANGLE: f64 = 3e-3;
 
-/// A carriage on a belt that a position servo drives, and the deviation of a reading, m.
+/// A carriage on a belt with a position servo, and the standard deviation of its reading, m.
 const BELT: &str = r#"<mujoco model="belt"><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody><body name="carriage"><joint name="axis" type="slide" axis="1 0 0" damping="12" armature="0.6"/>
     <geom name="carriage" type="box" size="0.08 0.05 0.03" mass="1.6" contype="0" conaffinity="0"/></body></worldbody>
@@ -34,7 +34,7 @@ const BELT: &str = r#"<mujoco model="belt"><option timestep="0.001" integrator="
 </mujoco>"#;
 const POSITION: f64 = 5e-4;
 
-/// Commands of a log: two waves and some steps, of an amplitude.
+/// Commands of a log: two waves and some steps, scaled by an amplitude.
 fn commands(episode: usize, amplitude: f64) -> Vec<f64> {
     let k = episode as f64;
     let at = |time: f64| {
@@ -47,18 +47,18 @@ fn commands(episode: usize, amplitude: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A machine, its commands' names, their amplitude, and what its sensor makes of what it shows.
+/// A machine, its commands and the errors of its sensor.
 struct Machine<'m> {
     /// The model, and the scene that is the real machine.
     model: &'m str,
     real: &'m str,
-    /// Drive and sensor.
+    /// Names of drive, sensor and joint.
     drive: &'m str,
     sensor: &'m str,
     joint: &'m str,
     amplitude: f64,
     noise: f64,
-    /// Time by which commands come late, in steps, and drift of the reading, its unit a second.
+    /// Delay of the commands, time steps, and drift of the reading, its unit per second.
     late: usize,
     drift: f64,
 }
@@ -66,7 +66,7 @@ struct Machine<'m> {
 impl Machine<'_> {
     fn write_study(&self, folder: &Path) {
         let fine = (ROW / STEP).round() as usize;
-        // Played step by step, so that commands may come late by a part of a row.
+        // Simulated step by step, so that commands can be late by part of a row.
         let mut player = Player::of(self.real, &[self.sensor], [STEP, STEP]);
         for episode in 0..EPISODES {
             let mut noise = normal(90 + episode as u64);
@@ -93,7 +93,7 @@ impl Machine<'_> {
         write_model(folder, self.model);
     }
 
-    /// Names of the effects of the verdict, and of each set that these data cannot tell from it, sorted.
+    /// Effects of the verdict and of each set that is ambiguous with it, each sorted.
     fn found(&self) -> Vec<Vec<String>> {
         let folder = tempfile::tempdir().unwrap();
         self.write_study(folder.path());
@@ -105,7 +105,7 @@ impl Machine<'_> {
     }
 }
 
-/// The drift is no force, and most of the gap.
+/// The drift is not a force, and causes most of the gap.
 #[test]
 fn a_late_drive_and_a_sensor_that_drifts() {
     if !has_contacts() {
@@ -130,7 +130,8 @@ fn a_late_drive_and_a_sensor_that_drifts() {
     );
 }
 
-/// On an axis drag does what viscous friction does, and so does the damping of its drive; but bearings that rub dry rub in their grease too.
+/// On an axis, drag and the drive's damping act as viscous friction does. But bearings with dry
+/// friction have viscous friction too, so both frictions come first.
 #[test]
 fn both_frictions_of_a_carriage_come_before_one_and_its_drag() {
     if !has_contacts() {

@@ -1,6 +1,8 @@
-//! A driven pendulum, integrated by hand, whose readings are filtered: their noise forgets itself over twenty rows only.
+//! A driven pendulum, integrated by hand, with filtered readings. Their noise decorrelates only
+//! over twenty rows.
 //!
-//! Beside the swing, differences over a few rows tell a third of such noise, and a model that is right would seem to leave three times its noise.
+//! Next to the motion, differences over a few rows show a third of such noise. A correct model
+//! would seem to leave three times its noise.
 
 use super::one_joint::{joint_log, normal};
 use super::world::write_files;
@@ -13,11 +15,11 @@ const NOMINAL: &str = r#"<mujoco model="pendulum"><option timestep="0.001" integ
   <sensor><jointpos name="angle" joint="hinge"/></sensor>
 </mujoco>
 "#;
-/// Length, m, mass, kg, and radius of the ball, m.
+/// Length, m, mass, kg, and radius of the bob, m.
 const BOB: (f64, f64, f64) = (0.4, 0.5, 0.03);
 const GRAVITY: f64 = 9.81;
 const DAMPING: f64 = 0.02;
-/// Deviation of the noise, rad, and its correlation from row to row.
+/// Standard deviation of the noise, rad, and its correlation from row to row.
 const NOISE: f64 = 4e-3;
 const CORRELATION: f64 = 0.95;
 const SECONDS: f64 = 5.0;
@@ -29,7 +31,8 @@ fn command(episode: usize, time: f64) -> f64 {
     0.5 * ((2.0 + 0.4 * k) * time).sin() + 0.3 * ((5.0 - 0.5 * k) * time).sin()
 }
 
-/// Angle and speed after a step of `h`: symplectic Euler, with dry friction that stops what it can stop.
+/// Angle and speed after a step of `h`: symplectic Euler, with dry friction that stops but does not
+/// reverse the motion.
 fn step([q, v]: [f64; 2], torque: f64, dry: f64, h: f64) -> [f64; 2] {
     let (length, mass, radius) = BOB;
     let inertia = mass * (length * length + 0.4 * radius * radius);
@@ -39,7 +42,7 @@ fn step([q, v]: [f64; 2], torque: f64, dry: f64, h: f64) -> [f64; 2] {
     [q + h * v, v]
 }
 
-/// A log of the pendulum with some dry friction, N m.
+/// A log of the pendulum with dry friction `dry`, N m.
 fn log(episode: usize, dry: f64) -> String {
     let mut fresh = normal(40 + episode as u64);
     let mut next = fresh();
@@ -64,7 +67,7 @@ fn a_right_model_leaves_no_gap_beside_slow_noise() {
     write_files(folder.path(), NOMINAL, MASS, |episode| log(episode, 0.0));
     let r = run_on(folder.path(), &[]).0.result;
     assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
-    // Some fifty readings are independent of each other.
+    // About fifty readings are independent of each other.
     let noise = r.gap.signals[0].noise;
     assert!((noise / NOISE).ln().abs() < 0.3, "{noise}");
 }

@@ -1,11 +1,12 @@
-//! Small gaps, and what is part of an effect rather than another one.
+//! Small gaps, and details of an effect that are no further effect.
 
 use std::path::Path;
 
 use super::world::{NOISE, NOMINAL, Truth, write_study};
 use super::{Kind, assert_names, run_on};
 
-/// The cart's study with a time step so fine that what is left of a gap is no integrator's.
+/// Writes the cart's study with so small a time step that the remaining gap is not the integrator's
+/// error.
 fn write_finely(folder: &Path, truth: Truth) {
     write_study(folder, truth);
     let finer = NOMINAL.replace("0.002", "0.0002");
@@ -21,7 +22,7 @@ fn a_gap_below_two_is_named_where_replays_of_logs_held_out_close_it() {
     assert!(1.2 < before && before < 2.2, "{before}");
     assert_eq!(r.verdict.kind, Kind::Effects, "{}", r.sentence);
     assert!(after < 1.05, "{after}");
-    // Drag on the cart, friction on the rail and a weaker drive are much alike here.
+    // Drag on the cart, friction on the rail and a weaker drive are nearly equivalent here.
     let friction = r.effects.iter().find(|e| e.effect == "viscous-friction");
     let friction = friction.expect("friction is among what is likely");
     let damping = friction.parameters["damping"];

@@ -1,4 +1,4 @@
-//! A cart with a pole that hangs from it, pulled by a motor through a soft belt, integrated by hand.
+//! A cart with a hanging pole, driven by a motor through a soft belt, integrated by hand.
 
 use super::one_joint::{machine_log, normal};
 use super::world::write_files;
@@ -14,16 +14,17 @@ const NOMINAL: &str = r#"<mujoco model="cart-pole"><option timestep="0.002" inte
 </mujoco>
 "#;
 const STUDY: &str = "name = \"cart\"\ntarget = \"geom/cart/mass\"\nrange = [0.4, 1.6]";
-/// Mass of the cart, kg: as if it were lighter, the rotor swings on the belt.
+/// Mass of the cart, kg. Because the rotor swings on the belt, the cart appears lighter.
 const CART: f64 = 1.36;
-/// Compliance of the belt, m/N, and mass of the rotor, seen from the rail, kg.
+/// Compliance of the belt, m/N, and mass of the rotor as felt at the rail, kg.
 const BELT: (f64, f64) = (0.1, 0.05);
-/// Mass of the pole, kg, how far below the pivot it is, m, and its inertia about its own centre, kg m².
+/// Mass of the pole, kg, distance of its centre below the pivot, m, and inertia about the centre,
+/// kg m².
 const POLE: (f64, f64, f64) = (0.13, 0.2, 1e-3);
 /// Damping of the rail, N s/m, and of the pivot, N m s/rad.
 const DAMPING: [f64; 2] = [3.0, 0.003];
 const GRAVITY: f64 = 9.81;
-/// Deviations of the readings of place, speed and angle.
+/// Standard deviations of the readings of position, m, speed, m/s, and angle, rad.
 const NOISE: [f64; 3] = [2e-3, 2e-2, 4e-3];
 const SECONDS: f64 = 3.3;
 const ROW: f64 = 0.01;
@@ -33,7 +34,7 @@ fn command(episode: usize, time: f64) -> f64 {
     2.5 * ((3.0 + 0.7 * k) * time).sin() + 1.2 * ((7.0 - 0.5 * k) * time + k).sin() - 1.2 * k.sin()
 }
 
-/// Places and speeds of cart, pole and rotor after a step of `h`: symplectic Euler.
+/// Positions and speeds of cart, pole and rotor after a step of `h`: symplectic Euler.
 fn step(at: [f64; 3], speed: [f64; 3], force: f64, h: f64) -> ([f64; 3], [f64; 3]) {
     let ([x, phi, rotor], [dx, dphi, drotor]) = (at, speed);
     let (mass, length, inertia) = POLE;
@@ -71,7 +72,8 @@ fn log(episode: usize) -> String {
     machine_log(header, ([SECONDS, ROW], 1000), (rest, "0,0,0,0"), machine)
 }
 
-/// A lighter cart makes up for most of the belt from row to row, and columns about that trajectory show nothing of it: replays do.
+/// From row to row a lighter cart makes up for most of the belt, and columns about that trajectory
+/// show no belt. Replays show it.
 #[test]
 fn a_soft_belt_is_named_that_no_column_shows() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! A machine that stands on the ground, whose document places it a little above: no log gives its start, and no sensor its place.
+//! A machine that stands on the ground, while its document places it slightly above. No log gives
+//! the initial state, and no sensor reads its position.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,15 +11,15 @@ use super::played::Player;
 use super::rows::{write_episode, write_model};
 use super::{has_contacts, run_on};
 
-/// Rows of a log, how many the machine has stood for before it, the time between them and a time step, s.
+/// Rows of a log, rows at rest before it, time between rows and time step, s.
 const ROWS: usize = 150;
 const BEFORE: usize = 100;
 const ROW: f64 = 0.01;
 const STEP: f64 = 0.002;
-/// Deviations of the readings: m/s², and m.
+/// Standard deviations of the readings of acceleration, m/s², and height, m.
 const NOISE: [f64; 2] = [0.03, 2e-4];
 
-/// A box on the ground in which a servo moves a mass up and down.
+/// A box on the ground, in which a servo moves a mass up and down.
 const SCENE: &str = r#"<mujoco model="box"><option timestep="0.002"/><worldbody>
     <geom type="plane" size="5 5 0.1"/>
     <body pos="0 0 0.055"><freejoint name="base"/><geom type="box" size="0.15 0.15 0.05" mass="4"/><site name="imu"/>
@@ -52,7 +53,8 @@ fn write_study(folder: &Path) {
     write_model(folder, SCENE);
 }
 
-/// From 5 mm above the ground the model falls, and its accelerometer reads nothing for 30 ms: it is the document that places it there.
+/// From 5 mm above the ground the model falls, and its accelerometer reads zero for 30 ms. Only the
+/// document causes this initial height.
 #[test]
 fn a_machine_that_stands_lacks_nothing() {
     if !has_contacts() {

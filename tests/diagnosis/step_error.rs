@@ -24,7 +24,7 @@ const SLIDE: [f64; 3] = [2.0, 50.0, 1.0];
 /// Time step, s, and time between rows, s.
 const DT: f64 = 0.004;
 const ROW: f64 = 0.02;
-/// Deviation of a reading, m.
+/// Standard deviation of a reading, m.
 const NOISE: f64 = 2e-5;
 
 fn model() -> String {
@@ -38,7 +38,7 @@ fn model() -> String {
     )
 }
 
-/// The solution of the oscillator's equation, from `[x, v]` after a time, s.
+/// Returns the exact state of the oscillator a time, s, after the state `[x, v]`.
 fn solution([x, v]: [f64; 2], time: f64) -> [f64; 2] {
     let [mass, stiffness, damping] = SLIDE;
     let (square, decay) = (stiffness / mass, 0.5 * damping / mass);
@@ -93,18 +93,19 @@ fn it_is_what_separates_a_row_of_steps_from_the_solution() {
     for k in 0..rows - 1 {
         let [next, ahead] = [solution(state(k), ROW), state(k + 1)];
         for i in 0..2 {
-            // The defect is what the steps come to less the state at the next row.
+            // The defect is the result of the steps minus the state at the next row.
             let from_solution = next[i] - ahead[i] - linear[0].defect[2 * k + i];
             let told = linear[0].state_columns[2 * k + i] / DEVIATION;
             left += (from_solution - told).powi(2);
             whole += from_solution.powi(2);
         }
     }
-    // What is of second order is smaller by about a step times the rate of the motion.
+    // Second-order terms are smaller by about a step times the rate of the motion.
     assert!(left.sqrt() < 0.05 * whole.sqrt(), "{left} {whole}");
 }
 
-/// Nothing is missing of the oscillator but what its steps leave, which readings show: friction or another spring would make up for it.
+/// The oscillator lacks nothing but the error of the steps, which its readings show. Without the
+/// column of that error, friction or another spring would make up for it.
 #[test]
 fn nothing_earns_evidence_by_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,9 +1,10 @@
-//! An encoder whose steps are far wider than the sensor's noise: rounding has no slope, and the log shows it by itself.
+//! An encoder with steps far wider than the sensor's noise. Rounding has no derivative, but the log
+//! shows it directly.
 
 use super::world::{NOISE, Truth, write_study};
 use super::{MASS, run_on};
 
-/// Sixty deviations of the noise, m/s.
+/// Sixty standard deviations of the noise, m/s.
 const STEP: f64 = 0.3;
 
 #[test]
@@ -25,8 +26,9 @@ fn steps_wider_than_the_noise_are_named_with_their_width_and_hide_nothing() {
         "{}",
         mass.estimate
     );
-    // The steps' own deviation is seventeen times the noise. What is left: noise puts a reading near an edge on either side of it,
-    // sixty times the noise apart, in about one of a hundred.
+    // The rounding's standard deviation is seventeen times the noise. What is left: near an edge,
+    // noise puts a reading on either side, sixty times the noise apart, in about one of a hundred
+    // rows.
     let [before, after] = [r.gap.identified, r.gap.refined];
     assert!(before > 8.0 && after < 0.6 * before, "{before} {after}");
 }

@@ -1,5 +1,5 @@
-//! A block on a ramp that slides where its model sticks: at the model's friction nothing moves, so that no slope there tells how
-//! far the friction is off.
+//! A block that slides on a ramp where its model sticks. With the model's friction nothing moves,
+//! so no derivative shows how far off the friction is.
 
 use std::fmt::Write as _;
 
@@ -10,20 +10,20 @@ use rand_chacha::ChaCha8Rng;
 use super::rows::{write_episode, write_model_with};
 use super::{assert_names, has_contacts, run_on};
 
-/// Gravity, m/s², and the slope of the ramp, rad.
+/// Gravity, m/s², and inclination of the ramp, rad.
 const GRAVITY: f64 = 9.81;
 const SLOPE: f64 = 0.3;
-/// Friction of the real block; the model has 1.
+/// Friction coefficient of the real block; the model has 1.
 const FRICTION: f64 = 0.15;
 /// Height of the block's centre, m.
 const HEIGHT: f64 = 0.02;
-/// Rows of a log, and the time between them, s.
+/// Rows of a log, and time between them, s.
 const ROWS: usize = 60;
 const ROW: f64 = 0.01;
-/// Deviation of a reading, m.
+/// Standard deviation of a reading, m.
 const NOISE: f64 = 1e-3;
 
-/// The block on its ramp, which lies in the frame's plane: gravity leans instead.
+/// The block on its ramp. The ramp lies in the plane of the frame, and gravity is tilted instead.
 fn model() -> String {
     let (sin, cos) = SLOPE.sin_cos();
     let (along, down) = (GRAVITY * sin, GRAVITY * cos);
@@ -36,8 +36,9 @@ fn model() -> String {
     )
 }
 
-/// Where the block is that begins at 0 with a speed down the ramp (m/s, negative uphill): friction acts against the motion, and is too
-/// small to hold it.
+/// Position of a block that begins at 0 with a speed down the ramp, m/s, negative uphill.
+///
+/// Friction acts against the motion, and is too small to hold the block.
 fn place(speed: f64, time: f64) -> f64 {
     let (sin, cos) = SLOPE.sin_cos();
     let uphill = GRAVITY * (sin + FRICTION * cos);
@@ -69,7 +70,7 @@ fn log(episode: u32) -> String {
     text + "\n"
 }
 
-/// Diagnoses the logs with a model, and what the study file says of its parameters.
+/// Diagnoses the logs with a model, and with the study's text about parameters.
 fn diagnosed(model: &str, parameters: &str) -> DiagnosisResult {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -97,7 +98,7 @@ fn a_parameter_at_whose_given_value_the_block_sticks_is_fitted_and_no_effect_is_
     if !has_contacts() {
         return;
     }
-    // The larger friction of two bodies counts.
+    // The larger friction of two bodies applies.
     let slick = model().replace("type=\"box\"", "type=\"box\" friction=\"0.02\"");
     let r = diagnosed(
         &slick,

@@ -1,4 +1,4 @@
-//! A diagnosis that is stopped answers with what it knows by then.
+//! A diagnosis that is stopped returns what it knows by then.
 
 use std::sync::Mutex;
 
@@ -11,10 +11,10 @@ use asid::results::naming::grouped;
 use super::diagnosis_support::engine;
 use super::world::{Truth, write_study};
 
-/// Stops the work at the ranking of this number, from 1.
+/// Stops the work at ranking number `last`, counted from 1.
 struct Until {
     last: usize,
-    /// Whether it is late from then on.
+    /// Whether to report that time is up from then on.
     late: bool,
     seen: Mutex<Vec<Vec<(String, f64)>>>,
 }
@@ -77,7 +77,8 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
     // Tolerances have no name.
     let mut table = until.seen.lock().unwrap()[0].clone();
     table.retain(|row| row.0 != "tolerances");
-    // The ranking is what the screening saw, in its order, but for the leader, which was linearised once more.
+    // The ranking has the screened sets in the order of the screening, except the leader, which was
+    // linearised once more.
     let screened = r.ranking.iter().filter(|s| s.fitted.is_none());
     for (row, (name, gain)) in screened.zip(&table[1..]) {
         assert_eq!(&grouped(&row.effects).join(" + "), name);
@@ -98,7 +99,7 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
     assert!(r.sentence.contains("stopped early"), "{}", r.sentence);
     let sum: f64 = r.hypotheses.iter().map(|h| h.probability).sum();
     assert!((sum - 1.0).abs() < 1e-9, "probabilities sum to {sum}");
-    // Angles: alike to itself, symmetric, and between alike and nothing in common.
+    // Angles: zero to itself, symmetric, and between parallel and orthogonal.
     let table = r.isolability.as_ref().unwrap();
     let n = table.effects.len();
     assert!(n > 1 && n <= 20);
@@ -106,15 +107,15 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
         assert!(table.angles[i][i] < 1e-3, "{}", table.effects[i]);
         for j in 0..n {
             let angle = table.angles[i][j];
-            // A right angle is told to a ten-thousandth.
+            // A right angle is exact to a ten-thousandth.
             assert!((0.0..=std::f64::consts::FRAC_PI_2 + 1e-4).contains(&angle));
             assert!((angle - table.angles[j][i]).abs() < 1e-6);
         }
     }
-    // Nothing of it hangs on the clock; the study is named after its folder.
+    // Nothing depends on the clock; the study is named after its folder.
     let mut again = run(&Until::ranking_number(1)).result;
     again.study.clone_from(&r.study);
-    // As text, in which a limit beyond the range, no number, is null.
+    // As JSON, in which a limit beyond the range is not a number but null.
     let [first, second] = [&r, &again].map(|r| serde_json::to_string(r).unwrap());
     assert_eq!(first, second);
 }
@@ -129,7 +130,8 @@ fn a_diagnosis_that_is_not_stopped_leaves_nothing_untried_and_draws_the_law_thro
     assert_eq!((&*force.dof, &*force.unit), ("rail", "N"));
     let s = &force.spread;
     assert!(s.before.len() > 100 && s.before.len() <= 400);
-    // What is missing is what the refined model adds, friction and the mass that was fitted with it, and what is left.
+    // The missing force is the sum of what the refined model adds (friction and the mass fitted
+    // with it) and what is left.
     let moving: Vec<usize> = (0..s.speed.len())
         .filter(|&k| s.speed[k].abs() > 0.2 && s.law[k].is_finite())
         .collect();

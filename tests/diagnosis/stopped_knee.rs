@@ -1,4 +1,5 @@
-//! A leg whose knee nearly sticks: a dry friction so large that slopes at the model without it tell little of it.
+//! A leg with a knee that nearly sticks: its dry friction is so large that derivatives at the model
+//! without friction hardly show it.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,18 +16,19 @@ use super::rows::write_model;
 use super::{assert_names, has_contacts};
 use crate::diagnosis_support::engine;
 
-/// Rows of a log, and the time between them, s.
+/// Rows of a log, and time between them, s.
 const ROWS: usize = 100;
 const ROW: f64 = 0.01;
 /// Time step, s.
 const STEP: f64 = 0.001;
-/// Deviation of a reading, m or rad.
+/// Standard deviation of a reading, m or rad.
 const NOISE: f64 = 1e-3;
-/// Dry friction of the real knee, N m, whose motor makes up to 3: one that stops it now and then, and one that holds it most of the time.
+/// Dry friction of the real knee, N m, whose motor has up to 3: one stops the knee now and then,
+/// one holds it most of the time.
 const STOPS: f64 = 1.0;
 const HOLDS: f64 = 2.5;
 
-/// A trunk on a vertical rail, whose leg pushes it off the floor.
+/// A trunk on a vertical rail, with a leg that pushes it off the floor.
 fn scene(friction: f64) -> String {
     format!(
         r#"<mujoco model="leg"><option timestep="{STEP}" cone="elliptic"/>
@@ -92,7 +94,8 @@ fn write_study(folder: &Path, friction: f64, episodes: u32) {
     write_model(folder, &scene(0.0));
 }
 
-/// Keeps what is tried and what leads each ranking, and stops the work once `is_enough` of both.
+/// Records the sets that are tried and the leader of each ranking. Stops the work once `is_enough`
+/// of both counts.
 struct Watched {
     tried: Mutex<Vec<String>>,
     led: Mutex<Vec<String>>,
@@ -117,7 +120,8 @@ impl Progress for Watched {
     }
 }
 
-/// Diagnoses the leg with some friction of its knee until what was seen `is_enough`; with what was seen.
+/// Diagnoses the leg with some friction of its knee until `is_enough`; also returns what was
+/// recorded.
 fn diagnosed(friction: f64, is_enough: fn(usize, usize) -> bool) -> (Diagnosis, Watched) {
     let folder = tempfile::tempdir().unwrap();
     write_study(folder.path(), friction, 5);
@@ -132,7 +136,8 @@ fn diagnosed(friction: f64, is_enough: fn(usize, usize) -> bool) -> (Diagnosis, 
     (found, watched)
 }
 
-/// By slopes at a knee without friction a hysteresis of the drives leads; replays with friction leave least.
+/// By derivatives at a knee without friction, hysteresis of the drives leads. Replays with friction
+/// have the smallest residuals.
 #[test]
 fn a_friction_that_stops_a_knee_is_tried_first_and_named() {
     if !has_contacts() {
@@ -146,7 +151,8 @@ fn a_friction_that_stops_a_knee_is_tried_first_and_named() {
     assert_eq!(watched.tried.lock().unwrap()[0], "coulomb-friction@knee");
 }
 
-/// In replays that begin where the knee stands, the model's own knee moves at once, and a little friction there takes little from it.
+/// In replays that begin where the knee stands, the model's knee moves at once, and a small
+/// friction reduces that motion only a little.
 #[test]
 fn a_friction_that_holds_a_knee_leads_the_screening() {
     if !has_contacts() {

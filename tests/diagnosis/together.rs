@@ -1,4 +1,4 @@
-//! Columns that the engine walks for together are those that it walks for one by one.
+//! Columns that share simulations agree with columns that are simulated one by one.
 
 use asid::core::progress::Silent;
 use asid::diagnosis::candidate::{Candidate, enumerate};
@@ -17,14 +17,17 @@ use asid::diagnosis::trajectory::Trajectory;
 use crate::arm;
 use crate::diagnosis_support::engine;
 
-/// Share by which a column may differ, of the largest of its law at any place, with which it is walked: effects of the sizes that a
-/// screening takes them at are not quite in proportion, and a force may change over a row otherwise than two numbers say.
-/// Friction that grows and falls with the speed differs by 0.06 here, a limit of both motors at once by 0.03, others by less.
+/// Largest allowed difference of a column, relative to the largest column of its law at any site in
+/// the same simulation.
+///
+/// Effects of the sizes of a screening are not quite linear. A force may also change over a row in
+/// a way that two numbers do not describe. Friction that changes with the speed differs by 0.06
+/// here, a limit of both motors at once by 0.03, others by less.
 const SHARE: f64 = 0.1;
-/// Rows of a log that are looked at.
+/// Rows of a log that are compared.
 const ROWS: usize = 60;
 
-/// All columns of some candidates, one a column of each form, along all walks.
+/// All columns of some candidates along all walks, one per form, each with the candidate's index.
 fn columns(
     context: &Context<'_>,
     model: (&Hypothesis, &[f64]),
@@ -51,7 +54,8 @@ fn columns(
     .collect()
 }
 
-/// Compares the columns of all candidates with those of each alone; `segments` says which walks are replayed.
+/// Compares the columns of all candidates together with those of each alone; `segments` says which
+/// walks are replayed.
 fn compare(segments: [Option<usize>; 2]) {
     let folder = tempfile::tempdir().unwrap();
     arm::write_study(folder.path());
@@ -100,7 +104,7 @@ fn compare(segments: [Option<usize>; 2]) {
 
     let base = (&hypothesis, &nominal[..]);
     let together = columns(&context, base, &estimate, &candidates);
-    // Of each candidate alone.
+    // The columns of each candidate alone.
     let alone: Vec<(usize, Vec<f64>)> = (0..candidates.len())
         .flat_map(|c| {
             let own = columns(&context, base, &estimate, &candidates[c..=c]);
@@ -119,7 +123,7 @@ fn compare(segments: [Option<usize>; 2]) {
     for ((c, one), (d, other)) in together.iter().zip(&alone) {
         assert_eq!(c, d);
         let apart: Vec<f64> = one.iter().zip(other).map(|(a, b)| a - b).collect();
-        // What a candidate does not do at all has no share.
+        // A candidate without any response has no relative difference.
         if length(other) == 0.0 {
             continue;
         }

@@ -1,7 +1,8 @@
-//! A tray that carries a block, whose lift gives way by a spring that the model lacks.
+//! A tray that carries a block, with a spring in its lift that the model lacks.
 //!
-//! The spring gives way by what the tray and the block weigh, so that a heavier tray, a constant force and a bias of the drive come out ahead of it by slopes, and
-//! the study's parameter stands in for a part of it.
+//! The spring yields under the weight of tray and block. By derivatives, a heavier tray, a constant
+//! force and a bias of the drive are therefore ahead of it. The study's parameter makes up for part
+//! of it.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,27 +12,28 @@ use super::played::Player;
 use super::rows::{write_episode, write_model_with};
 use super::{assert_names, has_contacts, run_on};
 
-/// Rows of a log, the time between them and a time step, s, and the deviation of a reading, m.
+/// Rows of a log, time between them and time step, s, and standard deviation of a reading, m.
 const ROWS: usize = 130;
 const ROW: f64 = 0.01;
 const STEP: f64 = 0.001;
 const NOISE: f64 = 5e-4;
-/// Logs, how many of them are no test, and rows before each in which the tray comes to rest.
+/// Logs, how many of them are for training, and rows before each log in which the tray comes to
+/// rest.
 const EPISODES: usize = 8;
 const TRAINING: usize = 6;
 const SETTLING: usize = 200;
 
-/// How far the lift gives way, m/N.
+/// Compliance of the lift, m/N.
 const COMPLIANCE: f64 = 1.5e-3;
-/// Masses of the tray and of the block, kg; the model has another block.
+/// Masses of the tray and of the block, kg; the model has another mass of the block.
 const TRAY: f64 = 0.6;
 const BLOCK: f64 = 0.15;
 
-/// Inertia of the lift's rotor, kg, and how its spring is damped, as a share of what is critical.
+/// Mass of the lift's rotor, kg, and damping ratio of its spring.
 const ROTOR: f64 = 0.05;
 const LOSS: f64 = 0.03;
 
-/// The tray on its `joints`, with what comes `before` and `after` its body, and the block on it.
+/// The tray on its `joints`, with the elements `before` and `after` its body, and the block on it.
 fn scene([before, joints, after]: [&str; 3], block: f64) -> String {
     format!(
         r#"<mujoco model="tray"><option timestep="{STEP}" integrator="implicitfast" cone="elliptic" impratio="10"/>
@@ -45,13 +47,13 @@ fn scene([before, joints, after]: [&str; 3], block: f64) -> String {
     )
 }
 
-/// The tray on its drive.
+/// The model: the tray directly on its drive.
 fn model() -> String {
     let lift = format!(r#"<joint name="lift" type="slide" axis="0 0 1" armature="{ROTOR}"/>"#);
     scene(["", &lift, ""], 0.25)
 }
 
-/// The tray on a spring on the rotor, which weighs nothing.
+/// The real machine: the tray on a spring on the rotor, with the rotor's weight compensated.
 fn machine() -> String {
     let stiffness = 1.0 / COMPLIANCE;
     let damping = 2.0 * LOSS * (stiffness * TRAY).sqrt();
@@ -91,7 +93,7 @@ fn write_study(folder: &Path) {
     write_model_with(folder, &model(), parameters);
 }
 
-/// A log of the hoist's commands and of readings of the tray and the block.
+/// A log of the hoist's commands and of the readings of tray and block.
 fn log(episode: usize, commands: impl Iterator<Item = f64>, places: &[f64]) -> String {
     let mut noise = normal(40 + episode as u64);
     let mut text = "time,ctrl.hoist".to_owned();
@@ -108,8 +110,10 @@ fn log(episode: usize, commands: impl Iterator<Item = f64>, places: &[f64]) -> S
     text
 }
 
-/// Its column comes far behind that of a heavier tray. Replays from where the logs say that they begin leave nothing with the spring; from where the model without it has
-/// smoothed them they do.
+/// The column of the spring is far behind that of a heavier tray.
+///
+/// Replays from the initial states of the logs leave no residual with the spring. Replays from the
+/// initial states that were smoothed under the model without it do.
 #[test]
 fn a_lift_that_gives_way_under_what_it_carries_is_no_heavier_tray() {
     if !has_contacts() {

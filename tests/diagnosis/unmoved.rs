@@ -1,18 +1,19 @@
-//! A block that is pushed over a floor in some logs and lies still in the others: those tell nothing of the floor.
+//! A block that is pushed over a floor in some logs and lies still in the others. The latter carry
+//! no information about the floor.
 
 use super::rows::{write_log, write_model};
 use super::{assert_names, has_contacts, run_on};
 
 /// Gravity, m/s².
 const GRAVITY: f64 = 9.81;
-/// Friction of the floor, and of the model's.
+/// Friction coefficient of the real floor, and of the model's.
 const FRICTION: f64 = 0.3;
 const MODEL: f64 = 0.25;
 /// Half the height of the block, m.
 const HEIGHT: f64 = 0.02;
-/// Speed that the block has at the start of each log, m/s; the last is held out.
+/// Initial speed of the block in each log, m/s; the last log is held out.
 const SPEEDS: [f64; 7] = [1.0, 0.0, 0.8, 1.2, 0.0, 0.9, 1.1];
-/// Rows of a log, the time between them, s, and the deviation of a reading, m.
+/// Rows of a log, time between them, s, and standard deviation of a reading, m.
 const ROWS: usize = 50;
 const ROW: f64 = 0.01;
 const NOISE: f64 = 1e-3;
@@ -27,7 +28,7 @@ fn model() -> String {
     )
 }
 
-/// Where the block is that begins with a speed, and slides until friction has stopped it.
+/// Position of a block that begins with a speed and slides until friction stops it.
 fn place(speed: f64, time: f64) -> f64 {
     let slides = time.min(speed / (FRICTION * GRAVITY));
     speed * slides - 0.5 * FRICTION * GRAVITY * slides * slides

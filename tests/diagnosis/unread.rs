@@ -1,5 +1,7 @@
-//! A joint that no sensor reads: a cart with a load that hangs from it, of which only the cart is read, integrated by hand. What the load does
-//! shows in how it pulls at the cart.
+//! A joint without a sensor: a cart with a hanging load, of which only the cart is read, integrated
+//! by hand.
+//!
+//! The load's motion shows in its pull on the cart.
 
 use std::fmt::Write as _;
 
@@ -24,9 +26,9 @@ const CART: f64 = 1.0;
 const LOAD: f64 = 0.5;
 const LENGTH: f64 = 0.4;
 const GRAVITY: f64 = 9.81;
-/// Friction of the rail, N s/m.
+/// Viscous friction of the rail, N s/m.
 const RAIL: f64 = 2.0;
-/// Deviation of a reading, m.
+/// Standard deviation of a reading, m.
 const NOISE: f64 = 1e-4;
 const SECONDS: f64 = 4.0;
 const ROW: f64 = 0.01;
@@ -36,7 +38,7 @@ fn command(episode: usize, time: f64) -> f64 {
     3.0 * ((4.0 + 0.3 * k) * time).sin() + 2.0 * ((7.0 - 0.2 * k) * time + k).sin()
 }
 
-/// A log of the machine with some friction of the pivot, N m s/rad.
+/// A log of the machine with viscous friction of the pivot, N m s/rad.
 fn log(episode: usize, pivot: f64) -> String {
     let mut random = ChaCha8Rng::seed_from_u64(70 + episode as u64);
     let mut noise = || NOISE * ((0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
@@ -49,7 +51,8 @@ fn log(episode: usize, pivot: f64) -> String {
         let force = command(episode, time);
         let _ = write!(text, "\n{time:.2},{force},{}", x + noise());
         for _ in 0..steps {
-            // Lagrange's equations of a cart and a point mass on a rope, symplectic Euler at a tenth of a millisecond.
+            // Lagrange's equations of a cart and a point mass on a rope, by symplectic Euler with a
+            // step of 0.1 ms.
             let (s, c) = angle.sin_cos();
             let pull =
                 LOAD * LENGTH * spin * spin * s + (LOAD * GRAVITY * s + pivot * spin / LENGTH) * c;
@@ -64,7 +67,8 @@ fn log(episode: usize, pivot: f64) -> String {
     text + "\n"
 }
 
-/// Kind of the verdict, its effects, and the largest missing force, in the unit of its joint.
+/// Returns the kind of the verdict, its effects, and the largest missing force in the unit of its
+/// joint.
 fn told(pivot: f64) -> (Kind, Vec<String>, f64) {
     let folder = tempfile::tempdir().unwrap();
     let mass = "name = \"mass\"\ntarget = \"geom/cart/mass\"\nrange = [0.8, 1.2]";

@@ -1,5 +1,8 @@
-//! Wiring faults of a planar arm that lacks a quarter of a drive's gain, integrated by another program: each is found and
-//! mended, all but an offset with and without the start in the log, and none is seen where there is none.
+//! Wiring faults of a planar arm that is integrated by another program and lacks a quarter of a
+//! drive's gain.
+//!
+//! Each fault is found and corrected, with and without the initial state in the log, except an
+//! offset. No fault is found where there is none.
 
 use asid::core::Episode;
 use asid::diagnosis::intake::Intake;
@@ -33,7 +36,7 @@ pub fn mended(study: &Study) -> Mended {
     mend(study, &machine(study), &Settings::default()).unwrap()
 }
 
-/// The study with its columns wired by `mappings`.
+/// The study with its columns rewired by `mappings`.
 fn spoilt(study: &Study, mappings: &[ColumnMapping]) -> Study {
     let layout = &machine(study).plant.layout.clone();
     let mut spoilt = study.clone();
@@ -43,21 +46,22 @@ fn spoilt(study: &Study, mappings: &[ColumnMapping]) -> Study {
     spoilt
 }
 
-/// Largest difference of the readings of two logs where both have one.
+/// Largest difference of the readings of two logs, over the entries that both have.
 fn distance(a: &Episode, b: &Episode) -> f64 {
     let pairs = a.readings.iter().zip(&b.readings);
     let differences = pairs.map(|(x, y)| (x - y).abs());
     differences.filter(|d| d.is_finite()).fold(0.0, f64::max)
 }
 
-/// A fault is found at its columns, and the mended logs are the right ones within a distance (rad).
+/// Asserts that a fault is found at its columns, and that the corrected logs are right within a
+/// distance, rad.
 fn is_mended(fault: &str, columns: &[&str], mappings: &[ColumnMapping], within: f64) {
     for starts in [true, false] {
         is_mended_from(starts, (fault, columns), mappings, within);
     }
 }
 
-/// The same of logs that give their starts, or do not.
+/// The same for logs with or without initial states.
 fn is_mended_from(
     starts: bool,
     (fault, columns): (&str, &[&str]),
@@ -98,7 +102,8 @@ fn right_wiring_stays_though_a_drive_has_lost_a_quarter() {
     }
 }
 
-/// In degrees it would hardly move, and the state with it from which the other joint is predicted.
+/// In degrees the reading would hardly move, and neither would the state from which the other joint
+/// is predicted.
 #[test]
 fn a_column_that_drifts_away_is_in_no_other_unit() {
     for rate in [-3.0, -1.5, 1.5, 3.0] {
@@ -140,7 +145,8 @@ fn wiring_swapped() {
     is_mended("wiring-swapped", &["q_elbow", "q_shoulder"], &swapped, 1e-9);
 }
 
-/// Commands that were swapped made more sense than either fault alone, and the log was then mended to nonsense.
+/// Guards against swapped commands as the explanation: they explain more than either fault alone,
+/// but the log is then corrected to nonsense.
 #[test]
 fn swapped_encoders_of_which_one_counts_the_other_way_are_found_at_once() {
     let from = |name: &str, from: &str, sign: f64| ColumnMapping {
@@ -157,7 +163,7 @@ fn swapped_encoders_of_which_one_counts_the_other_way_are_found_at_once() {
     }
 }
 
-/// Deviation of the readings of the first joint, rad.
+/// Standard deviation of the readings of the first joint, rad.
 fn deviation_of_the_shoulder(study: &Study) -> f64 {
     let readings = || {
         let logs = study.train.iter();
@@ -170,21 +176,23 @@ fn deviation_of_the_shoulder(study: &Study) -> f64 {
 
 #[test]
 fn wiring_offset() {
-    // By its own deviation; less than 0.4 of it is an effect.
+    // The shift is one standard deviation of the readings; less than 0.4 of it counts as an effect.
     let study = study(true);
     let deviation = deviation_of_the_shoulder(&study);
     let shifted = |share: f64| ColumnMapping {
         offset: share * deviation,
         ..of("q_shoulder")
     };
-    // Without the start only gravity tells the zero of the first joint, and what else the model lacks hides it.
+    // Without the initial state only gravity shows the zero of the first joint, and the other model
+    // errors hide it.
     let fault = ("wiring-offset", &["q_shoulder"][..]);
     is_mended_from(true, fault, &[shifted(1.0)], 0.1);
     let found = mended(&spoilt(&study, &[shifted(0.2)]));
     assert!(found.wiring.is_empty(), "{:?}", found.wiring);
 }
 
-/// The mean of a belt slide's sensor that drifts was taken for its zero, and the drift was named nowhere.
+/// Guards against the mean of a drifting sensor taken for its zero. The drift is then named
+/// nowhere.
 #[test]
 fn a_reading_that_drifts_has_no_other_zero() {
     let deviation = deviation_of_the_shoulder(&study(false));
@@ -210,7 +218,7 @@ fn the_mending_lines_are_those_of_the_study_file() {
         found.wiring[0].mend,
         "[[column]]\nname = \"q_elbow\"\nsign = -1.0"
     );
-    // Where the study maps the column already, the line stands for both.
+    // If the study already maps the column, the line replaces both mappings.
     let mut mapped = spoilt(
         &study(true),
         &[ColumnMapping {
@@ -230,7 +238,8 @@ fn the_mending_lines_are_those_of_the_study_file() {
     );
 }
 
-/// The clock of a hopper was estimated 5 ms short, and the rest came out as a delay of every sensor.
+/// Guards against a clock estimated 5 ms short, as on a hopper. The rest then appears as a delay of
+/// every sensor.
 #[test]
 fn a_clock_that_was_estimated_short_takes_the_delay_of_every_sensor() {
     const LATE: f64 = 0.04;
@@ -253,14 +262,14 @@ fn a_clock_that_was_estimated_short_takes_the_delay_of_every_sensor() {
         seconds
     };
     let first = told(&intake);
-    // The arm lacks a quarter of a drive's gain, too.
+    // The arm also lacks a quarter of a drive's gain.
     assert!((first - LATE).abs() < 0.01, "{first}");
     let delay = |site: &str| EffectSpec {
         name: "sensor-delay".into(),
         site: site.into(),
         values: vec![("delay".into(), LATE - first)],
     };
-    // One sensor that is late is no clock.
+    // One late sensor is no clock fault.
     assert_eq!(intake.estimated_short(&[delay("q_elbow")]), None);
     let short = intake.estimated_short(&[delay("q_elbow"), delay("q_shoulder")]);
     let layout = &machine.plant.layout;
@@ -272,7 +281,8 @@ fn a_clock_that_was_estimated_short_takes_the_delay_of_every_sensor() {
     }
 }
 
-/// The zero of an arm's shoulder was mended 13 mrad off, and a bias of that size was named beside it.
+/// Guards against a zero corrected 13 mrad off, as on an arm's shoulder. A bias of that size is
+/// then named in addition.
 #[test]
 fn a_zero_that_was_estimated_short_takes_the_bias_of_its_sensor() {
     let right = study(true);
@@ -285,7 +295,7 @@ fn a_zero_that_was_estimated_short_takes_the_bias_of_its_sensor() {
     let machine = machine(&right);
     let mut intake = Intake::of(&spoilt, &machine).unwrap();
     if distance(&intake.study.test[0].1, &right.test[0].1) > 0.5 * shift {
-        // What else the model lacks leaves the zero in doubt.
+        // The other model errors leave the zero ambiguous.
         intake.turn();
     }
     let told = |intake: &Intake| {
@@ -303,11 +313,11 @@ fn a_zero_that_was_estimated_short_takes_the_bias_of_its_sensor() {
         site: site.into(),
         values: vec![("bias".into(), shift + first)],
     };
-    // The zero of another sensor was right.
+    // The zero of the other sensor is right.
     assert_eq!(intake.estimated_short(&[bias("q_elbow")]), None);
     let short = intake.estimated_short(&[bias("q_shoulder")]).unwrap();
     intake.mend_further(&short, &machine.plant.layout).unwrap();
-    // Five digits of it.
+    // The correction has five digits.
     let rounded = 1e-4 * shift;
     assert!((told(&intake) + shift).abs() < rounded);
     for ((_, a), (_, b)) in intake.study.test.iter().zip(&right.test) {

@@ -1,7 +1,7 @@
-//! A cart on a rail, integrated by hand: another program than any engine here.
+//! A cart on a rail, integrated by hand, independently of all engines here.
 //!
-//! `m x'' = u - b x' + f(x, x', t)` by Runge and Kutta's method at a tenth of a
-//! millisecond, so that a diagnosis on these logs is no inverse crime.
+//! `m x'' = u - b x' + f(x, x', t)` is integrated by a Runge-Kutta method with a step of 0.1 ms, so
+//! that a diagnosis on these logs is no inverse crime.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,7 +9,7 @@ use std::path::Path;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// The model as its owner has it: 1 kg where the cart has another mass, and no effect.
+/// The model as its owner has it: a mass of 1 kg, which is not the real one, and no effect.
 pub const NOMINAL: &str = r#"<mujoco model="cart"><option timestep="0.002" integrator="implicitfast" gravity="0 0 0"/>
   <worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0" damping="2"/>
     <geom name="cart" type="box" size="0.05 0.05 0.05" mass="1"/></body></worldbody>
@@ -25,25 +25,26 @@ pub enum Truth {
     None,
     /// Dry friction, N, smoothed over 5 mm/s.
     Coulomb(f64),
-    /// The same, and how much more of it acts against motion in the positive direction than the mean, N.
+    /// Dry friction, N, and its excess over the mean against motion in the positive direction, N.
     UnevenFriction([f64; 2]),
     /// More viscous friction, N s/m.
     Viscous(f64),
     /// A spring, N/m.
     Spring(f64),
-    /// The command comes later, s.
+    /// A delay of the command, s.
     Delay(f64),
-    /// The motor gives no more than this, N.
+    /// A limit of the motor's force, N.
     Limit(f64),
-    /// The position is read too large, m.
+    /// A bias of the position reading, m.
     SensorBias(f64),
-    /// The speed is read in steps, m/s.
+    /// A step size of the speed reading, m/s.
     SpeedSteps(f64),
-    /// A magnet at 0.05 m, N: in no catalogue.
+    /// A magnet at 0.05 m, N. No catalogue has this effect.
     Magnet(f64),
-    /// A little more of both frictions and a command that comes 1.5 ms later, as at any machine; and a spring, N/m.
+    /// Slightly more of both frictions and a command 1.5 ms late, as on any machine; and a spring,
+    /// N/m.
     Ordinary(f64),
-    /// There are no readings but noise.
+    /// Readings of noise alone.
     Noise,
 }
 
@@ -51,17 +52,17 @@ pub enum Truth {
 pub const MASS: f64 = 1.3;
 const DAMPING: f64 = 2.0;
 const SECONDS: f64 = 2.4;
-/// Deviations of the noise, m and m/s.
+/// Standard deviations of the noise, m and m/s.
 pub const NOISE: [f64; 2] = [5e-4, 5e-3];
 
-/// A command of a few sines, different for each episode, N.
+/// Returns the command, a few sines that differ between episodes, N.
 fn command(episode: usize, t: f64) -> f64 {
     let k = episode as f64;
     let phase = 1.7 * k;
     4.0 * ((2.5 + 0.6 * k) * t + phase).sin() + 2.5 * ((6.0 + 0.5 * k) * t).sin()
 }
 
-/// The force of what the model lacks.
+/// Returns the force that the model lacks, N.
 fn extra(truth: Truth, x: f64, v: f64) -> f64 {
     match truth {
         Truth::Coulomb(force) => -force * (v / 5e-3).tanh(),
@@ -77,14 +78,14 @@ fn extra(truth: Truth, x: f64, v: f64) -> f64 {
     }
 }
 
-/// The command that arrives: held for 10 ms, and later by the delay.
+/// Returns the command that the drive gets, N: held for 10 ms, and late by the delay.
 fn arriving(truth: Truth, episode: usize, t: f64) -> f64 {
     let late = match truth {
         Truth::Delay(tau) => tau,
         Truth::Ordinary(_) => 0.0015,
         _ => 0.0,
     };
-    // Half a step of the integrator off the edge, so that rounding does not matter.
+    // Half a step of the integrator off the edge, so that rounding has no effect.
     let row = ((t - late + 5e-5) / 0.01).floor().max(0.0);
     let asked = command(episode, row * 0.01);
     match truth {
@@ -97,7 +98,7 @@ fn arriving(truth: Truth, episode: usize, t: f64) -> f64 {
 pub fn log(truth: Truth, episode: usize) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(77 + episode as u64);
     let mut normal = || -> f64 {
-        // The sum of twelve uniform numbers is normal enough.
+        // The sum of twelve uniform numbers is approximately normal.
         (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
     };
     let (mut x, mut v) = (0.0, 0.0);

@@ -9,7 +9,7 @@ use asid::effects::refined::{Refined, counts_episodes, needs};
 use asid::effects::{Effect, EffectSpec};
 use asid::mjcf::Plant;
 
-/// Engines that can do something.
+/// Engines with the needed capabilities.
 pub fn engines(needed: Capabilities) -> Vec<Box<dyn Backend>> {
     let made = all::<BackendEntry>()
         .into_iter()
@@ -17,7 +17,7 @@ pub fn engines(needed: Capabilities) -> Vec<Box<dyn Backend>> {
     made.filter(|b| b.capabilities().contains(needed)).collect()
 }
 
-/// Engines that can give a scene an effect, written as users write it.
+/// Engines that support an effect, which is written as users write it.
 pub fn engines_for(effect: &str) -> Vec<Box<dyn Backend>> {
     let spec: EffectSpec = effect.parse().unwrap();
     let entries = all::<EffectEntry>();
@@ -67,7 +67,7 @@ impl Bench {
         }
     }
 
-    /// Begins an episode of the logs, by its number.
+    /// Begins the episode of the logs with this number.
     pub fn episode(&mut self, number: usize) -> &mut Self {
         self.simulator.reset(&[0]).unwrap();
         self.simulator
@@ -81,7 +81,7 @@ impl Bench {
         self
     }
 
-    /// All sensors after each frame of `substeps`, one command a frame.
+    /// All sensors after each frame of `substeps` steps, with one command per frame.
     pub fn run(&mut self, substeps: usize, commands: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let recording = self.plant.layout.recording(&self.names).unwrap();
         let control = commands.concat();
@@ -94,13 +94,13 @@ impl Bench {
         out.chunks_exact(recording.width()).map(Vec::from).collect()
     }
 
-    /// The same with one command for a number of frames of one step.
+    /// The same with a constant command over frames of one step.
     pub fn hold(&mut self, frames: usize, command: &[f64]) -> Vec<Vec<f64>> {
         self.run(1, &vec![command.to_vec(); frames])
     }
 }
 
-/// Runs a check on each engine that can give the scene the effects.
+/// Runs a check on each engine that supports the effects.
 pub fn on_each(xml: &str, effects: &[&str], mut check: impl FnMut(&mut Bench)) {
     let able = engines_for(effects.first().unwrap_or(&"viscous-friction"));
     for backend in able {
@@ -113,7 +113,7 @@ pub fn on_each(xml: &str, effects: &[&str], mut check: impl FnMut(&mut Bench)) {
     }
 }
 
-/// Asserts that a figure is near what theory says, by an absolute tolerance.
+/// Asserts that a value agrees with theory within an absolute tolerance.
 #[track_caller]
 pub fn near(what: &str, found: f64, expected: f64, tolerance: f64) {
     assert!(

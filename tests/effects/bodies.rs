@@ -5,7 +5,7 @@ use super::bench::{Bench, engines_for, near, on_each};
 const G: f64 = 9.81;
 const DT: f64 = 0.002;
 
-/// A stone of 0.5 kg that falls, its centre of mass off its frame.
+/// A falling stone of 0.5 kg with an offset centre of mass.
 const STONE: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002"/>
   <worldbody><body name="stone"><freejoint name="free"/><inertial pos="0.02 0 0.01" mass="0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody>
   <sensor><framepos name="at" objtype="xbody" objname="stone"/><framelinvel name="v" objtype="body" objname="stone"/></sensor></mujoco>"#;
@@ -62,7 +62,7 @@ fn magnus_force_bends_a_path_to_a_circle() {
         &weightless(),
         &[&format!("magnus@stone:coefficient={k}")],
         |bench| {
-            // About the vertical through the centre of mass, which moves along x.
+            // Rotation about the vertical axis through the centre of mass, which moves along x.
             let qvel = [v, -spin * 0.02, 0.0, 0.0, 0.0, spin];
             bench.state(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], &qvel);
             let steps = 800;
@@ -83,13 +83,13 @@ fn a_constant_force_pushes_at_the_center_of_mass() {
             let rows = bench.run(500, &[vec![]]);
             for (i, force) in [1.0, -2.0, 0.5].into_iter().enumerate() {
                 near(&bench.engine, rows[0][3 + i], force / 0.5, 1e-3);
-                // It does not turn: the frame goes as the centre does.
+                // It does not rotate: the frame moves with the centre.
                 near(&bench.engine, rows[0][i], force / 0.5 / 2.0, 5e-3);
             }
         },
     );
     on_each(CART, &["constant-force@flap:x=2"], |bench| {
-        // Torque about y of a force along x at 0.1 m below the hinge.
+        // Torque about y of a force along x, 0.1 m below the hinge.
         let row = &bench.hold(1, &[0.0, 0.0])[0];
         let about = 0.02 + 0.3 * 0.01;
         near(&bench.engine, row[1], -0.1 * 2.0 / about * DT, 1e-3 * DT);
@@ -140,7 +140,7 @@ fn moments_of_inertia_and_centers_of_mass_move_a_flap() {
         on_each(CART, &[effect], |bench| {
             let [x, z]: [f64; 2] = center;
             let about = moment + 0.3 * (x * x + z * z);
-            // Weight at x ahead of the hinge turns it about +y.
+            // A weight at positive x turns the flap about +y.
             let torque = 0.2 + 0.3 * G * x;
             let w = bench.hold(1, &[0.0, 0.2])[0][1];
             near(effect, w, torque / about * DT, 2e-3 * DT * torque / about);
@@ -148,7 +148,8 @@ fn moments_of_inertia_and_centers_of_mass_move_a_flap() {
     }
 }
 
-/// Two links: the outer one, a ball of 0.5 kg, turns about the vertical at 0.3 m of a hinge that weight turns.
+/// Two links. The inner one is on a hinge that the weight turns. The outer one, a ball of 0.5 kg,
+/// turns about the vertical axis 0.3 m from that hinge.
 const LINKS: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>
   <worldbody><body name="inner"><joint name="lift" axis="0 1 0"/>
     <inertial pos="0.1 0 0" mass="0.3" diaginertia="0.001 0.002 0.002"/>
@@ -162,7 +163,7 @@ fn a_longer_link_carries_what_follows_farther_out() {
     let falls = |x: f64, along: f64| along * G * (0.3 * 0.1 + 0.5 * x) / about(x);
     for (effect, wanted) in [
         ("geometry@outer:x=0.05", falls(0.35, 1.0)),
-        // Of the inner link itself, which stands on the ground, nothing but its place changes.
+        // The inner link is on the ground, so only its position changes.
         ("geometry@inner:x=0.1,z=0.1", falls(0.3, 1.0)),
     ] {
         on_each(LINKS, &[effect], |bench| {
@@ -174,13 +175,15 @@ fn a_longer_link_carries_what_follows_farther_out() {
 
 #[test]
 fn an_axis_that_stands_askew_feels_the_part_of_the_weight_along_it() {
-    // Turned about x the axis is (0, 1, 0.45), before it has length 1; the moments about it are as about y.
+    // Turned about x, the axis is (0, 1, 0.45) before normalisation; the moments about it are those
+    // about y.
     let scene = LINKS.replace("0.001 0.002 0.002", "0.002 0.002 0.002");
     let about = 0.002 + 0.3 * 0.01 + 0.001 + 0.5 * 0.09;
     let torque = G * (0.3 * 0.1 + 0.5 * 0.3);
     on_each(&scene, &["geometry@inner:turn_x=0.45"], |bench| {
         let axis = [1.0 / 1.2025_f64.sqrt(), 0.45 / 1.2025_f64.sqrt()];
-        // The outer link keeps its own spin about the vertical: as a free ball it takes none of the turn about z.
+        // The outer link keeps its own rotation about the vertical axis. Like a free ball it takes
+        // no part in the rotation about z.
         let w = bench.hold(1, &[])[0][0];
         let about = about - 0.001 * axis[1] * axis[1];
         let wanted = axis[0] * torque / about;
@@ -188,7 +191,7 @@ fn an_axis_that_stands_askew_feels_the_part_of_the_weight_along_it() {
     });
 }
 
-/// A plate of half sizes 50, 20 and 80 mm and 0.3 kg that hangs from a hinge, driven.
+/// A driven plate of half sizes 50, 20 and 80 mm and 0.3 kg, which hangs from a hinge.
 const PLATE: &str = r#"<mujoco><option timestep="0.002" integrator="implicitfast"/>
   <worldbody><body name="flap"><joint name="hinge" axis="0 1 0"/>
     <geom name="plate" type="box" size="0.05 0.02 0.08" pos="0 0 -0.1" mass="0.3"/></body></worldbody>
@@ -197,7 +200,7 @@ const PLATE: &str = r#"<mujoco><option timestep="0.002" integrator="implicitfast
 
 #[test]
 fn mass_of_a_geom_composes_with_inertia_and_center_of_its_body() {
-    // A study that fits the mass of a geom can miss the inertia of its body.
+    // A study that fits the mass of a geom can lack the inertia of its body.
     let effects = [
         "mass@plate:factor=2",
         "inertia@flap:factor=1.5",
@@ -237,12 +240,13 @@ fn inertia_at_its_null_follows_the_mass_of_a_geom() {
     }
 }
 
-/// A payload of `m` at `r` of the centre of mass weighs as `p = m r` says, wherever the mass comes from: the
-/// torque about the hinge is that of the common centre.
+/// A payload of mass `m` at `r` from the centre of mass has the first moment `p = m r`, wherever
+/// the mass is defined. The torque about the hinge is that of the common centre.
 #[test]
 fn a_payload_has_mass_and_first_moments() {
     let values = "mass=0.4,moment_x=0.05,moment_y=0.02,moment_z=-0.03";
-    // The mass from <inertial>, and from geoms: what the body weighs, where, its moment about its centre.
+    // The mass from <inertial>, and from geoms: number of drives, and moment of inertia about the
+    // body's own centre.
     let plate = 0.3 / 3.0 * (0.05_f64.powi(2) + 0.08_f64.powi(2));
     for (xml, drives, own) in [(CART, 1, 0.02), (PLATE, 0, plate)] {
         for carried in [values, "mass=0.4", "moment_x=0.05"] {
@@ -265,12 +269,13 @@ fn a_payload_has_mass_and_first_moments() {
     }
 }
 
-/// The force of a payload is linear in its mass and first moments: half of all four is half of the torque.
+/// The force of a payload is linear in its mass and first moments: half of all four gives half of
+/// the torque.
 #[test]
 fn the_weight_of_a_payload_is_linear_in_its_parameters() {
     let hold = |share: f64| {
         let mut torques = Vec::new();
-        // A servo of 400 N m/rad shows the torque by how far it gives way.
+        // A servo of 400 N m/rad shows the torque by its deflection.
         let xml = PLATE.replace(
             r#"<motor name="turn" joint="hinge"/>"#,
             r#"<position name="turn" joint="hinge" kp="400" kv="40"/>"#,

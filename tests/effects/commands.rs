@@ -1,16 +1,16 @@
-//! Effects on the command, on a rotor that integrates its torque.
+//! Effects on commands, on a rotor that integrates its torque.
 
 use super::bench::{Bench, near, on_each};
 use super::{DT, INERTIA, ROTOR};
 
-/// A stiff, strongly damped servo without a load.
+/// A stiff, strongly damped servo without load.
 const SERVO: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0" integrator="implicitfast"/>
   <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
     <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
   <actuator><position name="drive" joint="spin" kp="20" kv="20"/></actuator>
   <sensor><jointpos name="angle" joint="spin"/><jointvel name="speed" joint="spin"/></sensor></mujoco>"#;
 
-/// Speed after `steps` steps of no torque and then one of 1 N m for the rest of a second.
+/// Speed at 1 s, after `steps` steps without torque and then 1 N m.
 fn speed_after_a_step(bench: &mut Bench, steps: usize) -> f64 {
     let commands: Vec<_> = (0..500).map(|k| vec![f64::from(k >= steps)]).collect();
     bench.run(1, &commands)[499][1]
@@ -52,7 +52,7 @@ fn a_lag_is_an_exponential() {
             &[&format!("actuator-lag@drive:time_constant={lag}")],
             |bench| {
                 let t = 1.0 - 50.0 * DT;
-                // Integral of 1 - exp(-t/T) over the inertia.
+                // The integral of 1 - exp(-t/T), divided by the inertia.
                 let expected = (t + lag * (-t / lag).exp_m1()) / INERTIA;
                 let speed = speed_after_a_step(bench, 50);
                 near(&bench.engine, speed, expected, 2.0 * bench.rounding);
@@ -81,24 +81,26 @@ fn gain_bias_saturation_and_dead_band_change_the_torque() {
 #[test]
 fn a_saturated_servo_pushes_with_its_limit() {
     on_each(SERVO, &["actuator-saturation@drive:limit=2"], |bench| {
-        // 20 N m and more are asked for until speed and damping come near them.
+        // The servo asks for more than 20 N m until the damping at its speed reduces that.
         let speed = bench.hold(50, &[1.5])[49][1];
         near(&bench.engine, speed, 2.0 * 50.0 * DT / INERTIA, 0.02);
     });
 }
 
-/// The servo ran away: its damping was made up for where its own limit had switched it off.
+/// Guards against a servo that runs away because its damping is compensated while its own limit has
+/// switched the damping off.
 #[test]
 fn a_saturated_servo_with_a_limit_of_its_own_does_not_run_away() {
     let limited = SERVO.replace("kv=\"20\"", "kv=\"20\" forcerange=\"-5 5\"");
     on_each(&limited, &["actuator-saturation@drive:limit=4"], |bench| {
-        // Swung to and fro by far more than the limit can follow.
+        // The command swings by far more than the limit can follow.
         let commands: Vec<_> = (0..3000)
             .map(|k| vec![if (k / 100) % 2 == 0 { 9.0 } else { -9.0 }])
             .collect();
         let rows = bench.run(1, &commands);
         let fastest = rows.iter().map(|row| row[1].abs()).fold(0.0, f64::max);
-        // A push of 4 N m for 0.2 s: twice that speed at most, for starts in between.
+        // A push of 4 N m for 0.2 s; the bound is twice that speed, because a push may begin at any
+        // speed.
         let bound = 2.0 * 4.0 * 0.2 / INERTIA;
         assert!(fastest < bound, "{}: {fastest} rad/s", bench.engine);
     });
@@ -107,7 +109,7 @@ fn a_saturated_servo_with_a_limit_of_its_own_does_not_run_away() {
 #[test]
 fn a_servo_with_a_dead_band_stops_short_of_its_command() {
     on_each(SERVO, &["actuator-deadband@drive:width=0.1"], |bench| {
-        // Overdamped: it creeps up to the edge of the band.
+        // Overdamped: it approaches the edge of the band slowly.
         let angle = bench.hold(4000, &[0.5])[3999][0];
         near(&bench.engine, angle, 0.4, 1e-3);
         let angle = bench.hold(500, &[0.45])[499][0];
@@ -115,7 +117,7 @@ fn a_servo_with_a_dead_band_stops_short_of_its_command() {
     });
 }
 
-/// Torque that arrives after each of some commands, from the change of the speed.
+/// Torque that arrives after each command, from the change of the speed.
 fn torques(bench: &mut Bench, commands: &[f64]) -> Vec<f64> {
     let commands: Vec<_> = commands.iter().map(|&c| vec![c]).collect();
     let mut before = 0.0;
@@ -131,7 +133,7 @@ fn torques(bench: &mut Bench, commands: &[f64]) -> Vec<f64> {
 #[test]
 fn play_of_a_command_is_the_play_operator() {
     on_each(ROTOR, &["actuator-hysteresis@drive:width=0.4"], |bench| {
-        // From the middle of the play up, down, and less far up again: an inner loop.
+        // From the middle of the play up, down, and partly up again: an inner loop.
         let sent = [0.5, 0.6, 0.8, 1.0, 0.9, 0.7, 0.3, 0.0, 0.3, 0.5];
         let arrives = [0.5, 0.5, 0.6, 0.8, 0.8, 0.8, 0.5, 0.2, 0.2, 0.3];
         for (found, expected) in torques(bench, &sent).into_iter().zip(arrives) {
@@ -140,7 +142,8 @@ fn play_of_a_command_is_the_play_operator() {
     });
 }
 
-/// The area of its loop is what play loses, at any rate: a delay's grows with the rate.
+/// The area of the hysteresis loop is the loss, and does not depend on the rate. That of a delay
+/// grows with the rate.
 #[test]
 fn play_of_a_command_loses_the_same_at_any_rate() {
     let (width, amplitude) = (0.4, 1.0);
@@ -153,7 +156,7 @@ fn play_of_a_command_loses_the_same_at_any_rate() {
             let area: f64 = (2 * rows..3 * rows)
                 .map(|k| (arrives[k - 1] + arrives[k]) / 2.0 * (sent[k] - sent[k - 1]))
                 .sum();
-            // A parallelogram as wide as the play and as high as what arrives.
+            // A parallelogram with the width of the play and the height of the arriving torque.
             let expected = width * 2.0 * (amplitude - width / 2.0);
             near(&bench.engine, area.abs(), expected, 0.01);
         });

@@ -1,23 +1,23 @@
-//! Friction and softness of contacts, on a block that slides, a ball that rolls, spins and bounces.
+//! Friction and softness of contacts, on a sliding block and a rolling, spinning or bouncing ball.
 
 use super::bench::{Bench, engines_for, near, on_each};
 
 const G: f64 = 9.81;
 const MU: f64 = 0.2;
 
-/// A block on a floor; the block's friction counts.
+/// A block on a floor; the block's friction applies.
 const BLOCK: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.001" cone="elliptic" impratio="10"/>
   <worldbody><geom name="floor" type="plane" size="9 9 1" friction="0.1 0 0"/>
     <body name="block" pos="0 0 0.05"><freejoint name="free"/><geom name="block" type="box" size="0.1 0.1 0.05" mass="1" friction="0.2 0 0"/></body>
   </worldbody><sensor><framepos name="at" objtype="xbody" objname="block"/></sensor></mujoco>"#;
 
-/// A ball of 5 cm that resists rolling and spinning, on a floor of the same friction.
+/// A ball of 5 cm with rolling and spinning friction, on a floor of the same friction.
 const BALL: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.001" cone="elliptic" impratio="100"/>
   <worldbody><geom name="floor" type="plane" size="9 9 1" friction="0.5 0.004 0.001" condim="6" solref="-40000 -18" solimp="0.95 0.95 0.001"/>
     <body name="ball" pos="0 0 0.05"><freejoint name="free"/><geom name="ball" size="0.05" mass="0.1" friction="0.5 0.004 0.001" condim="6" solref="-40000 -18" solimp="0.95 0.95 0.001"/></body>
   </worldbody><sensor><framepos name="at" objtype="xbody" objname="ball"/><frameangvel name="spin" objtype="xbody" objname="ball"/></sensor></mujoco>"#;
 
-/// Where a block at rest on the floor ends that is given a velocity.
+/// Final position of a block that rests on the floor and is given a velocity.
 fn slide(bench: &mut Bench, v: [f64; 2]) -> [f64; 2] {
     let rest = bench.run(200, &[vec![]])[0][2];
     let place = [0.0, 0.0, rest, 1.0, 0.0, 0.0, 0.0];
@@ -64,7 +64,8 @@ fn friction_drifts_with_time() {
         BLOCK,
         &[&format!("friction-drift@floor:per_second={rate}")],
         |bench| {
-            // v = 1 - mu g (t + rate t² / 2) is used up at t, having gone t - mu g (t²/2 + rate t³/6).
+            // v = 1 - mu g (t + rate t² / 2) reaches zero at t, after the distance t - mu g (t²/2 +
+            // rate t³/6).
             let a = MU * G;
             let t = (-1.0 + (1.0 + 2.0 * rate / a).sqrt()) / rate;
             let expected = t - a * (t * t / 2.0 + rate * t.powi(3) / 6.0);
@@ -74,7 +75,7 @@ fn friction_drifts_with_time() {
     );
 }
 
-/// It stops after `v² / (2 mu g)`.
+/// The block stops after `v² / (2 mu g)`.
 #[test]
 fn friction_changes_from_episode_to_episode() {
     let effect = "friction-trend@floor:per_episode=0.2";
@@ -111,7 +112,7 @@ fn friction_differs_by_direction() {
 fn rolling_and_torsional_friction_scale() {
     let (radius, mass) = (0.05, 0.1);
     let factor = 2.0;
-    // Damped critically, on engines too that cannot bounce.
+    // Critical damping, for engines without bounces too.
     let ball = BALL.replace("-40000 -18", "-40000 -400");
     on_each(&ball, &["rolling-friction@floor:factor=2"], |bench| {
         let rest = bench.run(500, &[vec![]])[0][2];

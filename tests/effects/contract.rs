@@ -1,5 +1,7 @@
-//! What every effect of the catalogue has to keep: off at its null values to the bit, at every site of
-//! machines of several kinds; memory in snapshots; sites that can be attached to.
+//! The contract of every effect of the catalogue, at every site of several kinds of machines.
+//!
+//! An effect has bitwise no influence at its null values, its memory is part of snapshots, and its
+//! sites are usable.
 
 use asid::core::registry::all;
 use asid::core::{Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Target};
@@ -38,16 +40,16 @@ const FLOOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002
 
 const FRAMES: usize = 40;
 const SUBSTEPS: usize = 5;
-/// The episode that the readings are of, for effects that count them.
+/// Episode of the readings, for effects that count episodes.
 const EPISODE: f64 = 3.0;
 
-/// Commands that move everything, `frames x nu`.
+/// Commands that move all joints, `frames x nu`.
 fn commands(nu: usize) -> Vec<f64> {
     let entry = |k: usize| 0.4 * (0.3 * (k / nu) as f64 + (k % nu) as f64).sin() + 0.1;
     (0..FRAMES * nu).map(entry).collect()
 }
 
-/// Readings of a machine in motion; with `cut`, the run is saved there, disturbed, and restored.
+/// Readings of a machine in motion. At the frame `cut` the run is saved, disturbed and restored.
 fn readings(
     backend: &dyn Backend,
     xml: &str,
@@ -93,7 +95,8 @@ fn readings(
     Ok(out.iter().map(|x| x.to_bits()).collect())
 }
 
-/// Calls with each effect at each of its sites, with values half-way to the far end of the range.
+/// Calls `check` for each effect at each of its sites: at null values, and half-way to the far end
+/// of the range.
 fn each_at_each_site(xml: &str, mut check: impl FnMut(&dyn Backend, &str, EffectSpec, EffectSpec)) {
     let plant = Plant::of(&scene(xml)).unwrap();
     for backend in engines(Capabilities::STEP_HOOKS) {
@@ -148,7 +151,7 @@ fn what_an_ordinary_machine_has_of_an_effect_lies_about_none_of_it() {
                             entry.name,
                             p.name
                         );
-                        // It is part of what may be named.
+                        // The end of a tolerance is within the range of a named value.
                         assert!(*high < p.range[1], "{} {}", entry.name, p.name);
                     }
                 }
@@ -158,7 +161,8 @@ fn what_an_ordinary_machine_has_of_an_effect_lies_about_none_of_it() {
     assert!(counted > 20, "{counted}");
 }
 
-/// Beside a simulation in which the same parameters can be set and are not: an engine may round otherwise once a body's mass can change.
+/// Compares with a simulation whose same parameters can be set but are not, since an engine may
+/// round differently once a body's mass can change.
 #[test]
 fn every_effect_is_off_at_its_null_value_to_the_bit() {
     for xml in [ARM, FLOOR] {
@@ -236,7 +240,8 @@ fn what_an_effect_refines_goes_with_or_is_mistaken_for_is_in_the_catalogue() {
     }
 }
 
-/// A dry friction of 2 N was refined from a Stribeck friction that began with nothing of it.
+/// Guards against a refinement without the simpler law's value: a Stribeck friction that begins
+/// without the dry friction of 2 N that it refines.
 #[test]
 fn what_an_effect_takes_over_is_a_parameter_of_a_law_that_it_refines() {
     let all = all::<EffectEntry>();
@@ -259,7 +264,8 @@ fn what_an_effect_takes_over_is_a_parameter_of_a_law_that_it_refines() {
     }
 }
 
-/// A clock that was mended is taken back by what a delay of every sensor says in seconds: there must be no other parameter.
+/// A clock correction is revised by the seconds that a delay of every sensor has. Such an effect
+/// must therefore have no other parameter.
 #[test]
 fn an_effect_that_delays_readings_has_a_time_and_nothing_else() {
     let effects = all::<EffectEntry>().into_iter();

@@ -1,4 +1,5 @@
-//! `<general>` actuators are what their gains make them: effects find them and act as on the short forms.
+//! `<general>` actuators with the gains of a short form: effects find them and act as on the short
+//! form.
 
 use super::ROTOR;
 use super::bench::{Bench, engines_for, near};
@@ -18,7 +19,7 @@ fn machine(actuator: &str) -> String {
         .replace(r#"name="spin" axis"#, r#"name="spin" armature="0.05" axis"#)
 }
 
-/// Short forms beside the same written out.
+/// Short forms, each with its `<general>` equivalent.
 const PAIRS: [[&str; 2]; 3] = [
     [
         r#"<position name="drive" joint="spin" kp="30" kv="4" forcerange="-2 2" gear="1.5"/>"#,
@@ -34,7 +35,7 @@ const PAIRS: [[&str; 2]; 3] = [
     ],
 ];
 
-/// Engines that take `<general>` actuators.
+/// Engines that support the effect and `<general>` actuators.
 fn engines_for_general(effect: &str) -> Vec<Box<dyn asid::core::Backend>> {
     let scene = super::bench::scene(&machine(PAIRS[0][1]));
     let engines = engines_for(effect).into_iter();
@@ -85,7 +86,7 @@ fn effects_act_on_general_actuators_as_on_their_short_forms() {
     }
 }
 
-/// What the document says of a drive is what the engine made of it, through classes too.
+/// Gains that are read from the document agree with the engine's, for classes too.
 #[test]
 fn gains_of_the_document_are_those_of_the_engine() {
     let class = r#"<default><default class="a"><general biastype="affine" gainprm="50" biasprm="0 -50 -4"/></default>
@@ -111,7 +112,7 @@ fn gains_of_the_document_are_those_of_the_engine() {
         };
         for entry in all::<BackendEntry>() {
             let backend = (entry.make)().unwrap();
-            // rapier's own reading of classes is its own matter.
+            // rapier interprets classes in its own way.
             if backend.name() != "mujoco" {
                 continue;
             }
@@ -124,7 +125,7 @@ fn gains_of_the_document_are_those_of_the_engine() {
     }
 }
 
-/// A `kv` that the engine works out of a damping ratio is that of the effects: `2 ratio sqrt(kp I)`.
+/// The effects use the `kv` that the engine computes from a damping ratio: `2 ratio sqrt(kp I)`.
 #[test]
 fn effects_know_the_damping_that_a_ratio_makes() {
     let about: f64 = super::INERTIA + 0.05;

@@ -33,7 +33,8 @@ fn viscous_friction_and_rotors_are_those_of_the_engine() {
 fn viscous_friction_is_an_exponential() {
     on_each(ROTOR, &["viscous-friction@spin:damping=0.8"], |bench| {
         let speed = bench.state(&[0.0], &[3.0]).hold(500, &[0.0])[499][1];
-        // An implicit step takes 1 / (1 + x) where e^-x is right, x = damping dt / inertia.
+        // An implicit step has the factor 1 / (1 + x) instead of e^-x, with x = damping dt /
+        // inertia.
         let expected = 3.0 * (-0.8_f64 / INERTIA).exp();
         near(&bench.engine, speed, expected, 0.003 * expected);
     });
@@ -54,7 +55,8 @@ fn coulomb_friction_stops_a_rotor_in_time_and_holds_it() {
                 let expected = direction * (1.0 - against * half as f64 * DT / INERTIA);
                 near(&bench.engine, rows[half - 1][1], expected, 2e-3);
                 near(&bench.engine, rows[899][1], 0.0, 2e-3);
-                // Held just below what breaks it away, gone just above.
+                // The friction holds the rotor just below the breakaway torque, and releases it
+                // just above.
                 let held = bench
                     .state(&[0.0], &[0.0])
                     .hold(500, &[0.95 * direction * against]);
@@ -72,7 +74,7 @@ fn coulomb_friction_stops_a_rotor_in_time_and_holds_it() {
     );
 }
 
-/// With an offset alone the force is the same in both directions and at rest: a constant one.
+/// With an offset alone the force is the same in both directions and at rest: a constant force.
 #[test]
 fn an_offset_of_dry_friction_is_a_force_against_the_positive_direction() {
     on_each(ROTOR, &["coulomb-friction@spin:offset=0.2"], |bench| {
@@ -125,7 +127,7 @@ fn a_spring_swings_about_its_rest() {
             let omega = (stiffness / INERTIA).sqrt();
             for (k, row) in rows.iter().enumerate() {
                 let t = (k + 1) as f64 * DT;
-                // Half a step of phase.
+                // Tolerance: half a step of phase.
                 near(
                     &bench.engine,
                     row[0],
@@ -137,8 +139,8 @@ fn a_spring_swings_about_its_rest() {
     );
 }
 
-/// A swing in a cubic spring alone (Duffing): of the amplitude `A` its period is `4 K(1/√2) sqrt(I / c) / A`,
-/// `K(1/√2) = 1.8540746773` the complete elliptic integral.
+/// Oscillation on a purely cubic spring (Duffing). At amplitude `A` its period is
+/// `4 K(1/√2) sqrt(I / c) / A`, with the complete elliptic integral `K(1/√2) = 1.8540746773`.
 #[test]
 fn a_spring_that_stiffens_has_the_period_of_its_elliptic_integral() {
     let (cubic, amplitude): (f64, f64) = (20.0, 0.5);
@@ -147,7 +149,8 @@ fn a_spring_that_stiffens_has_the_period_of_its_elliptic_integral() {
         &["joint-stiffness@spin:rest=0.3,cubic=20"],
         |bench| {
             let rows = bench.state(&[0.3 + amplitude], &[0.0]).hold(2000, &[0.0]);
-            // The speed is zero after each half period: interpolated between steps.
+            // The speed crosses zero after each half period; the time is interpolated between
+            // steps.
             let mut turns = Vec::new();
             for (k, pair) in rows.windows(2).enumerate() {
                 let (a, b) = (pair[0][1], pair[1][1]);
@@ -157,14 +160,15 @@ fn a_spring_that_stiffens_has_the_period_of_its_elliptic_integral() {
             }
             let found = 2.0 * (turns[2] - turns[0]) / 2.0;
             let expected = 4.0 * 1.854_074_677_3 * (INERTIA / cubic).sqrt() / amplitude;
-            // The amplitude, and the period with it, varies by half a step's work.
+            // The amplitude, and with it the period, varies by the work of half a step.
             near(&bench.engine, found, expected, 4e-3 * expected);
             let energy = |row: &[f64]| {
                 0.5 * INERTIA * row[1].powi(2) + 0.25 * cubic * (row[0] - 0.3).powi(4)
             };
             let whole = 0.25 * cubic * amplitude.powi(4);
             for row in &rows {
-                // Half a step's work; what rapier adds on its own grows by up to half a percent a second.
+                // The work of half a step. rapier's own energy error grows by up to half a percent
+                // per second.
                 let slack = if bench.rounding > 1e-6 {
                     0.02 * whole
                 } else {
@@ -181,7 +185,7 @@ fn a_spring_that_stiffens_has_the_period_of_its_elliptic_integral() {
     );
 }
 
-/// The cubic term adds to the linear one.
+/// The cubic term adds to the linear term.
 #[test]
 fn a_spring_with_both_terms_holds_a_known_load() {
     let damped = ROTOR.replace(r#"name="spin" axis"#, r#"name="spin" damping="4" axis"#);
@@ -207,7 +211,7 @@ fn ripple_keeps_energy() {
         };
         let whole = energy(0.1, 1.0);
         for row in bench.state(&[0.1], &[1.0]).hold(1000, &[0.0]) {
-            // Half a step's work.
+            // Tolerance: the work of half a step.
             near(
                 &bench.engine,
                 energy(row[0], row[1]),

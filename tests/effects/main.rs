@@ -1,4 +1,5 @@
-//! Effects against theory on every engine that is built in, and off at their null value to the bit.
+//! Effects compared with theory on every built-in engine, and bitwise without any effect at their
+//! null value.
 
 #![allow(clippy::unwrap_used)]
 
@@ -25,7 +26,7 @@ pub const INERTIA: f64 = 0.5;
 /// Time step of the scenes, s.
 pub const DT: f64 = 0.002;
 
-/// A motor on a hinge about the vertical axis: inertia 0.5 kg m² about it, from the rotor alone.
+/// A motor on a hinge about the vertical axis, with an inertia of 0.5 kg m² from the rotor alone.
 pub const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
   <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
     <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>

@@ -1,9 +1,9 @@
-//! Backlash and compliance: what a joint feels of a drive that does not sit on it.
+//! Backlash and compliance: the effect on a joint of a drive that is not rigidly attached to it.
 
 use super::bench::{Bench, engines_for, near, on_each};
 use super::{DT, INERTIA};
 
-/// A rotor on a servo or a motor, with the attributes of its joint.
+/// A rotor on a servo or a motor; `joint` has the attributes of its joint.
 fn machine(joint: &str, drive: &str) -> String {
     format!(
         r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 -9.81" integrator="implicitfast"/>
@@ -14,7 +14,7 @@ fn machine(joint: &str, drive: &str) -> String {
     )
 }
 
-/// Inertia about the joint, with the centre of mass off it: that of the other scenes.
+/// Inertia about the joint, kg m², with an offset centre of mass: the same as in the other scenes.
 const ABOUT: f64 = 0.46 + 0.2 * 0.2;
 
 const LEVEL: &str = r#"axis="0 0 1""#;
@@ -25,8 +25,8 @@ fn the_inertia_is_as_said() {
     assert!((ABOUT - INERTIA).abs() < 1e-12);
 }
 
-/// Angle after the command has gone to a value within eight seconds and stayed for two: so slowly that
-/// the joint never runs ahead of its drive.
+/// Angle after the command has moved to a value over eight seconds and stayed there for two. The
+/// motion is so slow that the joint never runs ahead of its drive.
 fn settle(bench: &mut Bench, from: f64, to: f64) -> f64 {
     let ramp = |k: usize| vec![from + (to - from) * (k as f64 / 4000.0).min(1.0)];
     let commands: Vec<_> = (0..5000).map(ramp).collect();
@@ -40,7 +40,7 @@ fn play_loses_exactly_its_width() {
     on_each(&xml, &[&format!("backlash@spin:width={width}")], |bench| {
         let up = settle(bench, 0.0, 0.5);
         let down = settle(bench, 0.5, -0.5);
-        // Dry friction holds the joint where the drive leaves it, by at most its own share short.
+        // Dry friction holds the joint where the drive leaves it, at most `short` before the goal.
         let short = friction / 400.0;
         near(
             &bench.engine,
@@ -60,7 +60,8 @@ fn under_a_load_of_one_sign_play_is_an_offset() {
         let mut plain = Bench::new(&*backend, &xml, &[]);
         let mut loose = Bench::new(&*backend, &xml, &[&format!("backlash@spin:width={width}")]);
         let angles = [&mut plain, &mut loose].map(|b| settle(b, 0.1, -0.2));
-        // The weight pulls it down: a positive turn about y. cos changes little over the offset.
+        // The weight pulls down: a positive rotation about y. The cosine changes little over the
+        // offset.
         near(&plain.engine, angles[1] - angles[0], width / 2.0, 1e-3);
     }
 }
@@ -74,7 +75,7 @@ fn a_motor_crosses_the_play_and_takes_its_load_along() {
         let whole = INERTIA + rotor;
         let speed = torque * 200.0 * DT / whole;
         near(&bench.engine, push[199][1], speed, 1e-3);
-        // The rotor turns back against a load that goes on as it was.
+        // The rotor turns back while the load continues as before.
         let back = bench.hold(500, &[-torque]);
         let crossing = (2.0 * width * rotor / torque).sqrt();
         let steps = (crossing / DT) as usize;
@@ -85,7 +86,7 @@ fn a_motor_crosses_the_play_and_takes_its_load_along() {
             bench.engine,
             back[steps + 3]
         );
-        // Nothing is lost of the momentum, and nothing bounces.
+        // No momentum is lost, and nothing bounces.
         near(
             &bench.engine,
             back[499][1],
@@ -95,8 +96,11 @@ fn a_motor_crosses_the_play_and_takes_its_load_along() {
     });
 }
 
-/// Runs a machine without a transmission and with ones that hardly give, whose first readings must be the same. Backward Euler here, the engine's own
-/// order there: one step's worth of motion.
+/// Asserts that a machine without a transmission and with nearly rigid ones has the same first
+/// readings.
+///
+/// One uses backward Euler, the other the engine's own order, so they may differ by one step of
+/// motion.
 fn rigid_is_the_drive_itself(xml: &str, run: impl Fn(&mut Bench) -> Vec<Vec<f64>>) {
     for effect in [
         "joint-compliance@spin:compliance=1e-7",
@@ -134,7 +138,8 @@ fn a_stiff_spring_and_no_play_are_the_drive_itself() {
     }
 }
 
-/// Placed elsewhere, a joint whose rotor stayed behind would be pulled by a spring of 10^7 N m/rad: by 10^4 N m for a milliradian.
+/// When a joint is set elsewhere, its rotor must move with it. Otherwise a spring of 10^7 N m/rad
+/// would pull with 10^4 N m per milliradian.
 #[test]
 fn the_rotor_goes_along_where_its_joint_is_placed_elsewhere() {
     rigid_is_the_drive_itself(&machine(DRIVEN, STIFF), |bench| {
@@ -168,7 +173,7 @@ fn rotor_and_load_swing_against_each_other() {
     on_each(&xml, &[&effect], |bench| {
         let rows = bench.hold(600, &[torque]);
         let mean = torque / (INERTIA + rotor);
-        // The acceleration swings about its mean with sqrt(k (1/I + 1/J)).
+        // The acceleration oscillates about its mean at sqrt(k (1/I + 1/J)).
         let above: Vec<bool> = rows
             .windows(2)
             .map(|w| (w[1][1] - w[0][1]) / DT > mean)
@@ -183,8 +188,10 @@ fn rotor_and_load_swing_against_each_other() {
     });
 }
 
-/// The swing dies as the transmission's own loss has it: by its ratio of critical for a rotor against a joint that is held, and by
-/// `sqrt(1 + J/I)` of that where the joint gives way. Backward Euler would add its stiffness times the time step.
+/// The oscillation decays by the transmission's own damping ratio.
+///
+/// The ratio is given for a rotor against a fixed joint. Where the joint yields, it is
+/// `sqrt(1 + J/I)` of that. Backward Euler would add the stiffness times the time step.
 #[test]
 fn a_spring_in_series_swings_on_for_long() {
     let (rotor, compliance, loss) = (0.1, 0.05, 0.02);

@@ -1,11 +1,11 @@
-//! `docs/effects.md` says of every parameter what the catalogue has.
+//! `docs/effects.md` agrees with the catalogue in every parameter.
 
 use std::collections::BTreeMap;
 
 use asid::core::registry::all;
 use asid::effects::{EffectEntry, EffectParameter, Start};
 
-/// Words between code marks; `e0` … `e15` are all of them.
+/// Words in code marks; `e0` … `e15` stands for all of them.
 fn names(cell: &str) -> Vec<String> {
     let quoted: Vec<&str> = cell.split('`').skip(1).step_by(2).collect();
     let numbered = |word: &str| Some(word.strip_prefix('e')?.parse::<usize>().ok());
@@ -24,21 +24,22 @@ fn numbers(cell: &str) -> Vec<f64> {
     words.filter_map(|w| w.parse().ok()).collect()
 }
 
-/// Whether a cell tells how a search for a value begins.
+/// Whether a cell matches how a search for a value begins.
 fn tells(cell: &str, start: Start) -> bool {
     match start {
         Start::Slope => cell == "slope",
         Start::Given => cell == "given",
         Start::Multiples(_, values) => numbers(cell) == values,
         Start::Set(_, value) => cell.starts_with("kept at ") && numbers(cell) == [value],
-        // Of these the page leaves some to the reader: signs, and numbers in a row.
+        // The page describes these in words: signs, and numbers in a row.
         Start::Values(_) | Start::Choice(_) | Start::Places(_) => {
             !["slope", "given"].contains(&cell)
         }
     }
 }
 
-/// Rows of the page's tables: range, null value and start of each effect's parameters.
+/// Rows of the page's tables: range, null value and start of each parameter, by effect and
+/// parameter.
 fn page() -> BTreeMap<(String, String), [String; 3]> {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/effects.md");
     let text = std::fs::read_to_string(file).unwrap();

@@ -1,19 +1,20 @@
-//! Effects on readings, against the same readings without them.
+//! Effects on readings, compared with the same readings without them.
 
 use super::bench::{Bench, engines_for, near, on_each};
 use super::{DT, ROTOR};
 
-/// Rows of 10 ms.
+/// Physics steps of a row of 10 ms.
 const SUBSTEPS: usize = 5;
 const ROW: f64 = SUBSTEPS as f64 * DT;
 const FRAMES: usize = 60;
 
-/// A body that falls through a frame's sensor: a vector.
+/// A falling body with frame sensors, which read vectors.
 const FALL: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002"/>
   <worldbody><body name="stone"><freejoint name="free"/><geom name="stone" size="0.1" mass="1"/></body></worldbody>
   <sensor><framepos name="at" objtype="xbody" objname="stone"/><framequat name="turn" objtype="xbody" objname="stone"/></sensor></mujoco>"#;
 
-/// Readings without and with an effect under a constant torque, or none.
+/// Calls `check` with the readings without and with an effect. The rotor is under a constant
+/// torque, other scenes under none.
 fn both(xml: &str, effect: &str, mut check: impl FnMut(&str, f64, &[Vec<f64>], &[Vec<f64>])) {
     for backend in engines_for(effect) {
         let command = if xml == ROTOR { vec![0.8] } else { vec![] };
@@ -55,7 +56,7 @@ fn a_delayed_reading_is_that_of_then() {
 
 #[test]
 fn a_delay_does_not_blur_a_fast_motion() {
-    // A servo's swing at 5 Hz, seen every 10 ms, half a row late.
+    // A servo's oscillation at 5 Hz, read every 10 ms, half a row late.
     let spring = ROTOR.replace(r#"axis="0 0 1""#, r#"axis="0 0 1" stiffness="493.5""#);
     for backend in engines_for("sensor-delay") {
         let run = |effects: &[&str], substeps: usize, frames: usize| {
@@ -79,7 +80,7 @@ fn a_delay_does_not_blur_a_fast_motion() {
 
 #[test]
 fn a_filter_is_exact_for_a_line() {
-    // The speed grows as a line: y = r - m T (1 - e^(-t/T)) after the first row.
+    // The speed is linear in time: y = r - m T (1 - e^(-t/T)) after the first row.
     for time in [0.004, 0.05] {
         both(
             ROTOR,

@@ -1,9 +1,10 @@
-//! Gains of servos, with and without limits of their force.
+//! Gains of servos, with and without force limits.
 
 use super::INERTIA;
 use super::bench::{Bench, engines_for, near, on_each};
 
-/// A servo that holds a weight: 1 kg at 0.2 m on a level axis, the inertia about it that of the other scenes.
+/// A servo that holds a weight of 1 kg at 0.2 m on a level axis. The inertia about the axis is that
+/// of the other scenes.
 fn loaded(servo: &str) -> String {
     format!(
         r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 -9.81" integrator="implicitfast"/>
@@ -60,23 +61,23 @@ fn gains_are_those_of_the_engine() {
     }
 }
 
-/// A model that is 60 times as stiff as the machine and limited in force: far off it is at its limit like the
-/// machine, and near its aim it is not.
+/// A model 60 times as stiff as the machine, with a force limit. Far from the goal the servo is at
+/// its limit, like the machine; near the goal it is not.
 #[test]
 fn a_limited_servo_is_at_its_limit_until_its_gain_asks_for_less() {
     let servo = r#"position kp="998" kv="0" forcerange="-2.9 2.9""#;
     let effect = "servo-stiffness@drive:factor=0.016";
     let kp = 998.0 * 0.016;
     on_each(&weightless(servo), &[effect], |bench| {
-        // Beyond 2.9 / kp of error the limit pushes against the damping of 1 N m s/rad.
+        // Above an error of 2.9 / kp the limit pushes against the damping of 1 N m s/rad.
         let rows = bench.hold(100, &[1.0]);
         let t = 0.2_f64;
         let speed = 2.9 * -(-t / INERTIA).exp_m1();
         near(&bench.engine, rows[99][1], speed, 0.01);
-        // At the end it rests at its aim.
+        // At the end it rests at its goal.
         let end = bench.hold(10_000, &[1.0]);
         near(&bench.engine, end[9999][0], 1.0, 1e-3);
-        // About it, it swings as a spring of this gain: w = sqrt(kp / I - (d / 2 I)²).
+        // About the goal it oscillates as on a spring of this gain: w = sqrt(kp / I - (d / 2 I)²).
         let rows = bench.state(&[1.05], &[0.0]).hold(2000, &[1.0]);
         let crossings: Vec<f64> = rows
             .windows(2)
@@ -112,7 +113,7 @@ fn damping_of_a_velocity_servo_is_its_gain() {
     );
 }
 
-/// What limits a servo, or rubs by its load, goes by the gain that it has and not by the model's.
+/// Effects that limit a servo's force, or depend on it, use the changed gain and not the model's.
 #[test]
 fn effects_of_the_force_follow_the_gain() {
     let soft = "servo-stiffness@drive:factor=0.1";

@@ -1,9 +1,10 @@
-//! What a drive loses to speed and to its supply.
+//! Effects of speed and of the supply on a drive's force.
 
 use super::bench::{near, on_each};
 use super::{DT, INERTIA, ROTOR};
 
-/// A torque that falls from `F` at rest to nothing at `v0`: the speed approaches `v0` with `I v0 / F`.
+/// A torque that falls from `F` at rest to zero at `v0`: the speed approaches `v0` with the time
+/// constant `I v0 / F`.
 #[test]
 fn a_drive_whose_force_falls_with_speed_approaches_its_own_speed() {
     let (force, speed) = (2.0, 3.0);
@@ -14,7 +15,7 @@ fn a_drive_whose_force_falls_with_speed_approaches_its_own_speed() {
             for k in [100, 500, 1500] {
                 let t = k as f64 * DT;
                 let expected = -(-t * force / (INERTIA * speed)).exp_m1() * speed;
-                // A step of backward Euler.
+                // The error of one step of backward Euler.
                 near(&bench.engine, rows[k - 1][1], sign * expected, 5e-3);
             }
         }
@@ -27,7 +28,8 @@ fn below_the_limit_a_command_is_as_given() {
     on_each(ROTOR, &[effect], |bench| {
         let speed = bench.hold(500, &[0.5])[499][1];
         near(&bench.engine, speed, 0.5 / INERTIA, 2.0 * bench.rounding);
-        // Braking, the limit rises as it slows down: F (1 - v / v0) brings e-folds back.
+        // While braking, the limit rises as the rotor slows down: F (1 - v / v0) gives an
+        // exponential.
         let rows = bench.state(&[0.0], &[1.5]).hold(100, &[-5.0]);
         let t = 100.0 * DT;
         let expected = 3.0 - 1.5 * (t * 2.0 / (INERTIA * 3.0)).exp();
@@ -35,8 +37,8 @@ fn below_the_limit_a_command_is_as_given() {
     });
 }
 
-/// The same for a servo with damping and limits of its own, whatever it asks for. Its `kp` is small since
-/// rapier's servos fall short by `kp v dt`.
+/// The same for a servo with damping and limits of its own, whatever its command. Its `kp` is
+/// small, since rapier's servos fall short by `kp v dt`.
 #[test]
 fn a_servo_is_held_to_its_torque_speed_line() {
     let servo = r#"<position name="drive" joint="spin" kp="1" kv="5" forcerange="-1.5 1.5"/>"#;
@@ -49,7 +51,7 @@ fn a_servo_is_held_to_its_torque_speed_line() {
     assert!(xml.contains("kp"));
     let effect = "torque-speed-limit@drive:force=2,speed=3";
     on_each(&xml, &[effect], |bench| {
-        // 1.5 N m up to a quarter of the speed, then down the line.
+        // 1.5 N m up to a quarter of the speed, then along the line.
         let rows = bench.hold(800, &[1000.0]);
         let knee = 0.75 * INERTIA / 1.5;
         near(&bench.engine, rows[99][1], 1.5 * 0.2 / INERTIA, 0.01);
@@ -59,13 +61,13 @@ fn a_servo_is_held_to_its_torque_speed_line() {
     });
 }
 
-/// A gain `1 + r t` of a torque gives the speed `u (t + r t² / 2) / I`.
+/// With the gain `1 + r t` of a torque `u`, the speed is `u (t + r t² / 2) / I`.
 #[test]
 fn a_supply_that_fades_loses_speed_with_the_square_of_time() {
     on_each(ROTOR, &["supply-drift@drive:rate=-0.4"], |bench| {
         let rows = bench.hold(2000, &[1.0]);
         for k in [500, 1250, 2000] {
-            // Nothing is left after 2.5 s.
+            // The supply is empty after 2.5 s.
             let t = (k as f64 * DT).min(2.5);
             let expected = (t - 0.2 * t * t) / INERTIA;
             near(&bench.engine, rows[k - 1][1], expected, 1.0 * DT / INERTIA);
@@ -77,7 +79,7 @@ fn a_supply_that_fades_loses_speed_with_the_square_of_time() {
     });
 }
 
-/// `dv/dt = (1 + rate n) u / I`.
+/// `dv/dt = (1 + rate n) u / I` in episode `n`.
 #[test]
 fn a_supply_that_falls_from_episode_to_episode_gives_a_smaller_share_each_time() {
     on_each(ROTOR, &["supply-trend@drive:rate=-0.1"], |bench| {
