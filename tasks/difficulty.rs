@@ -1,22 +1,25 @@
-//! Difficulties that the tasks have in common: the speed of the hand, and the trackers.
+//! Difficulties that several tasks share: the speed of the hand, and the trackers.
 
 use asid_core::signal::Signal;
 use asid_core::{Difficulty, Error, Levels, Result};
 
 use crate::steering::{FRAME_PERIOD, FRAMES};
 
-/// Rates of trackers that can be set, Hz: a reading a control step, or one a frame.
+/// Settable tracker rates, Hz: one reading per control step, or one per frame.
 const RATES: [f64; 2] = [1.0 / (FRAMES as f64 * FRAME_PERIOD), 1.0 / FRAME_PERIOD];
 
-/// Largest speed of the hand while it explores, m/s. The published controller reaches 0.75 m/s
-/// (0.075 m in a control step of 0.1 s).
+/// Largest speed of the hand during exploration, m/s.
+///
+/// The published controller reaches 0.75 m/s (0.075 m in a control step of 0.1 s).
 pub fn hand_speed(default: f64) -> Difficulty {
     let about = "largest speed of the hand while it explores";
     Difficulty::new("hand_speed", "m/s", default, [0.1, 0.75], about).published(0.75)
 }
 
-/// Noise of the tracked positions, and rate of the readings. The published noise is 0.01 on each
-/// entry of an observation, which comes once a control step.
+/// Noise of the tracked positions, and rate of the readings.
+///
+/// The published noise is 0.01 on each entry of an observation, which arrives once per control
+/// step.
 pub fn tracker() -> Vec<Difficulty> {
     let noise = "standard deviation of the noise of each entry of a tracked position";
     let rate = "readings of the trackers a second: 10 or 50";
@@ -26,17 +29,19 @@ pub fn tracker() -> Vec<Difficulty> {
     ]
 }
 
-/// Noise of the tracked orientations. 0.01 on each entry of a unit quaternion is 0.02 rad of rotation
-/// about each axis, for the quaternion of a small turn holds half its angle.
+/// Noise of the tracked orientations.
+///
+/// 0.01 on each entry of a unit quaternion is 0.02 rad of rotation about each axis, because the
+/// quaternion of a small rotation holds half its angle.
 pub fn angle_noise() -> Difficulty {
     let about = "standard deviation of the noise of a tracked orientation about each axis";
     Difficulty::new("tracker_angle_noise", "rad", 0.01, [1e-3, 0.1], about).published(0.02)
 }
 
-/// What the trackers read: the sensors whose names end in `quat` are orientations.
+/// Signals that the trackers read; sensors whose names end in `quat` are orientations.
 ///
 /// # Errors
-/// When a difficulty that they need is missing.
+/// When a required difficulty is missing.
 pub fn signals(levels: &Levels, sensors: &[&str]) -> Result<Vec<Signal>> {
     let signal = |sensor: &&str| {
         let noise = levels.get(if sensor.ends_with("quat") {
@@ -55,7 +60,7 @@ pub fn signals(levels: &Levels, sensors: &[&str]) -> Result<Vec<Signal>> {
 /// Rate of the trackers, Hz.
 ///
 /// # Errors
-/// When there would not be a reading at the end of each control step.
+/// When the rate does not give a reading at the end of each control step.
 pub fn rate(levels: &Levels) -> Result<f64> {
     let rate = levels.get("tracker_rate")?;
     if RATES.contains(&rate) {

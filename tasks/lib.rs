@@ -1,5 +1,7 @@
-//! The tasks of the ASID paper, one folder each: the code and its `scene.xml` side by side. When an attempt succeeds is
-//! decided by `outcome` in the folder's `metric.rs`. [`sphere`] is no task but what the sphere tasks share.
+//! The tasks of the ASID paper, one folder each, with the code next to its `scene.xml`.
+//!
+//! `outcome` in the folder's `metric.rs` decides whether an attempt succeeds. [`sphere`] is no
+//! task; it holds the common code of the sphere tasks.
 
 mod difficulty;
 pub mod laptop_articulation;
@@ -15,12 +17,12 @@ pub mod steering;
 
 use asid_core::{Layout, Result, Target};
 
-/// Targets of parameters that are built in.
+/// Targets of built-in parameters.
 pub(crate) fn targets<const N: usize>(targets: [&str; N]) -> Vec<Target> {
     targets.iter().filter_map(|t| t.parse().ok()).collect()
 }
 
-/// Lays a free body down: `x` and `y` (m) and the turn about the vertical (rad) of `start`, at a height (m).
+/// Places a free body flat: `x` and `y` (m) and yaw (rad) from `start`, at a height (m).
 pub(crate) fn lay(
     layout: &Layout,
     joint: &str,
@@ -44,7 +46,7 @@ pub(crate) fn circle([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Corners of an axis-aligned rectangle: its middle and half sizes, m.
+/// Corners of an axis-aligned rectangle from its centre and half sizes, m.
 pub(crate) fn rectangle([x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]> {
     vec![
         [x - a, y - b],

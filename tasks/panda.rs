@@ -1,4 +1,4 @@
-//! The arm that every task shares: a Franka Panda with its hand.
+//! The arm of all tasks: a Franka Panda with its hand.
 
 use asid_core::{Error, Result, Scene};
 use asid_mjcf::kinematics::Chain;
@@ -6,13 +6,13 @@ use asid_mjcf::kinematics::Chain;
 /// The arm's document, included by each scene as `../panda.xml`.
 pub const PANDA_XML: &str = include_str!("panda.xml");
 
-/// Joints of the arm.
+/// Number of joints of the arm.
 pub const ARM_JOINTS: usize = 7;
 
 /// Site between the finger pads.
 pub const END_EFFECTOR: &str = "ee";
 
-/// Command of each finger when the hand is open, m from the middle.
+/// Finger command of the open hand, m from the middle.
 pub const FINGER_OPEN: f64 = 0.04;
 
 /// Names of the arm's own sensors: the end effector's position, then the joints.
@@ -23,7 +23,7 @@ pub fn proprioception() -> Vec<String> {
         .collect()
 }
 
-/// A scene with the arm, and the arm's posture in its first keyframe, rad.
+/// Loads a scene with the arm; also returns the arm's posture in the first keyframe, rad.
 ///
 /// # Errors
 /// When the document cannot be read, or has no arm or no keyframe.

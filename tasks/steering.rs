@@ -1,5 +1,5 @@
-//! Exploration's commands, the same for every task with the arm: the hand is moved over the
-//! scene at a fixed height, by displacements in the plane.
+//! Exploration commands of every task with the arm: displacements move the hand in the plane, over
+//! the scene, at a fixed height.
 
 use asid_core::task::{Commander, Coordinate};
 use asid_core::{Result, Scene};
@@ -11,7 +11,7 @@ use crate::panda;
 /// Length of a frame, s.
 pub const FRAME_PERIOD: f64 = 0.02;
 
-/// Frames of a control step (10 Hz).
+/// Frames per control step (10 Hz).
 pub const FRAMES: usize = 5;
 
 /// Largest entry of an action, m.
@@ -25,23 +25,23 @@ pub fn action() -> Vec<Coordinate> {
         .into()
 }
 
-/// How fast and where a task lets the hand go.
+/// Speed and workspace of the hand in a task.
 #[derive(Clone, Copy, Debug)]
 pub struct Steering {
-    /// Largest speed, m/s. The published controller reaches 0.75.
+    /// Largest speed, m/s. The published controller reaches 0.75 m/s.
     pub speed: f64,
-    /// Where the hand may go along x, m.
+    /// Workspace along x, m.
     pub x: [f64; 2],
-    /// And along y, m.
+    /// Workspace along y, m.
     pub y: [f64; 2],
-    /// Farthest from the arm's base, m.
+    /// Largest distance from the arm's base, m.
     pub reach: f64,
     /// Command of each finger, m from the middle; 0 for the closed gripper.
     pub fingers: f64,
 }
 
 impl Steering {
-    /// A commander that starts at the home posture.
+    /// Creates a commander that starts at the home posture.
     ///
     /// # Errors
     /// When the scene has no arm.
@@ -64,7 +64,7 @@ impl Steering {
     }
 }
 
-/// The commander.
+/// The commander of the hand.
 struct Hand {
     controller: CartesianController,
     steering: Steering,

@@ -1,5 +1,5 @@
-//! Gives a scene what is off in a perturbed world, by means that any scene has: another step, values of
-//! parameters, effects of the catalogue, and the world's own tracker.
+//! Applies a perturbation to a scene, by means that any scene supports: another time step,
+//! parameter values, effects of the catalogue, and the world's own tracker.
 
 use std::sync::Arc;
 
@@ -14,24 +14,25 @@ use asid_mjcf::Plant;
 
 use crate::Perturbation;
 
-/// Effect on the command of a servo, and its parameter.
+/// Effect for the command lag of a servo, and its parameter.
 const LAG: [&str; 2] = [command_dynamics::LAG, "time_constant"];
 
-/// Effect on a mass, and its parameter.
+/// Effect for a mass, and its parameter.
 const MASS: [&str; 2] = [mass::MASS, "factor"];
 
-/// A scene as it is in a perturbed world.
+/// A scene in a perturbed world.
 pub struct Perturbed {
-    /// The world, compiled.
+    /// The compiled world.
     pub model: Arc<dyn Model>,
     /// Its tracker.
     pub tracker: TrackerErrors,
-    /// Parts of the perturbation that this engine or scene cannot have, and why.
+    /// Parts of the perturbation that this engine or scene does not support, with the reasons.
     pub left_out: Vec<String>,
 }
 
-/// Compiles `scene`, which has `values` and `effects` already, as it is in a perturbed world. Unknowns
-/// keep their values: those are the truth.
+/// Compiles `scene`, which already has `values` and `effects`, with a perturbation.
+///
+/// Unknowns keep their values: those are the truth.
 ///
 /// # Errors
 /// When the engine refuses the scene.
@@ -45,7 +46,7 @@ pub fn perturb(
 ) -> Result<Perturbed> {
     let step = Plant::of(scene)?.layout.timestep / drawn.steps.max(1) as f64;
     let scene = scene.with_timestep(step)?;
-    // Of the finer scene: a lag counts its steps.
+    // The plant of the scene with the finer step, since a lag counts its steps.
     let plant = Arc::new(Plant::of(&scene)?);
     let model = backend.load(&scene)?;
     let mut left_out = Vec::new();
@@ -74,7 +75,7 @@ pub fn perturb(
     let offsets = signals.iter().map(|s| drawn.tracker.offset.get(&s.sensor));
     let mut offset: Vec<f64> = offsets.flatten().flatten().copied().collect();
     if offset.iter().all(|x| *x == 0.0) {
-        // None leaves a reading as it is to the bit.
+        // Without an offset a reading stays bit-identical.
         offset.clear();
     }
     let tracker = TrackerErrors {
@@ -98,7 +99,8 @@ fn spec([effect, parameter]: [&str; 2], site: String, value: f64) -> EffectSpec 
     }
 }
 
-/// Adds effects of one name where the engine can have them, and where nobody gave the site that effect.
+/// Adds effects of one kind where the engine supports them and the site does not already have that
+/// effect.
 fn add(
     backend: &dyn Backend,
     name: &str,
@@ -127,8 +129,10 @@ fn lacks(backend: &dyn Backend, lacking: Capabilities) -> String {
     format!("engine `{}` lacks {}", backend.name(), names.join(", "))
 }
 
-/// The softness of all geoms that can touch, as MJCF writes it, but for unknowns and values that are given.
-/// All alike: a contact mixes the numbers of its two geoms.
+/// Perturbed contact softness of all geoms that can touch, as MJCF writes it; unknowns and given
+/// values are left out.
+///
+/// All geoms change alike, since a contact mixes the numbers of its two geoms.
 fn softness(
     backend: &dyn Backend,
     model: &dyn Model,
@@ -161,8 +165,8 @@ fn softness(
                 continue;
             }
             let nominal = model.nominal(&target).map_err(|e| e.to_string())?;
-            // (time constant, damping ratio) where positive, else (-stiffness, -damping):
-            // stiffness goes with 1 / (time x ratio)^2, damping with 1 / time.
+            // (time constant, damping ratio) where positive, else (-stiffness, -damping). Stiffness
+            // is proportional to 1 / (time x ratio)^2, damping to 1 / time.
             let change = match (index, nominal > 0.0) {
                 (0, true) => time,
                 (0, false) => (time * damping).powi(-2),
@@ -175,7 +179,7 @@ fn softness(
     Ok(softer)
 }
 
-/// The masses of what lies free, each body's with all that hangs on it, but for unknowns.
+/// Mass effects of free bodies, each with everything attached to it; unknowns are left out.
 fn masses(plant: &Plant, unknowns: &[Parameter], drawn: &Perturbation) -> Result<Vec<EffectSpec>> {
     let effect = (find::<EffectEntry>(MASS[0])?.make)();
     let root = |mut body: usize| {

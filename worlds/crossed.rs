@@ -1,9 +1,9 @@
-//! The other engine of a crossed world.
+//! The engine of a crossed world.
 
 use asid_core::registry::{BackendEntry, Origin, all};
 use asid_core::{Capabilities, Error, Result};
 
-/// The engine other than `simulator` that is linked in and can do what a task needs.
+/// Returns the linked engine other than `simulator` that has the capabilities a task needs.
 ///
 /// # Errors
 /// [`Error::Config`] where there is none, or more than one; the message says how to name one.

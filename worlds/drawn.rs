@@ -1,4 +1,4 @@
-//! What is off in one perturbed world.
+//! The perturbation that is drawn for one perturbed world.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +43,7 @@ pub struct TrackerPerturbation {
     pub dropout: f64,
 }
 
-/// A uniform draw; `low` to the bit where the range is one value.
+/// Uniform draw; exactly `low` where the range is a single value.
 fn uniform([low, high]: [f64; 2], rng: &mut Rng) -> f64 {
     let u: f64 = rng.random();
     if low == high {
@@ -53,7 +53,7 @@ fn uniform([low, high]: [f64; 2], rng: &mut Rng) -> f64 {
     }
 }
 
-/// A draw that is even on a logarithmic scale.
+/// Log-uniform draw.
 fn factor(range: [f64; 2], rng: &mut Rng) -> f64 {
     if range[0] == range[1] {
         return uniform(range, rng);
@@ -61,8 +61,8 @@ fn factor(range: [f64; 2], rng: &mut Rng) -> f64 {
     uniform(range.map(f64::ln), rng).exp()
 }
 
-/// A vector of this length in a direction that is drawn evenly from the sphere (Archimedes: the height
-/// is uniform).
+/// A vector of this length in a uniformly random direction (Archimedes: the height on a sphere is
+/// uniform).
 fn direction(length: f64, rng: &mut Rng) -> [f64; 3] {
     let z = rng.random_range(-1.0..1.0_f64);
     let (sin, cos) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();
@@ -70,7 +70,7 @@ fn direction(length: f64, rng: &mut Rng) -> [f64; 3] {
     [r * cos, r * sin, z].map(|x| length * x)
 }
 
-/// The constant error of a signal of this kind and length.
+/// Draws the constant error of a signal of this kind and length.
 fn offset(kind: &str, len: usize, ranges: &PerturbationRanges, rng: &mut Rng) -> Vec<f64> {
     let (position, rotation) = (ranges.tracker_offset, ranges.tracker_rotation);
     match (kind, len) {
@@ -80,7 +80,7 @@ fn offset(kind: &str, len: usize, ranges: &PerturbationRanges, rng: &mut Rng) ->
             let sign = if rng.random() { 1.0 } else { -1.0 };
             vec![sign * uniform(rotation, rng)]
         }
-        // Speeds and forces are no tracker's.
+        // Speeds and forces are not tracked.
         _ => vec![0.0; len],
     }
 }
@@ -132,7 +132,7 @@ impl Perturbation {
         })
     }
 
-    /// What is off, in words.
+    /// Describes the perturbation in words.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let ms = |s: f64| format!("{:.1} ms", 1e3 * s);

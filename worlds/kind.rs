@@ -1,4 +1,4 @@
-//! Names of the kinds.
+//! Kinds of real worlds and their names.
 
 use std::fmt;
 use std::str::FromStr;
@@ -9,17 +9,17 @@ use serde::{Serialize, Serializer};
 /// How a simulated real world differs from the method's simulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum WorldKind {
-    /// It is the simulator: same engine, same scene.
+    /// The simulator itself: same engine, same scene.
     #[default]
     Matched,
     /// Another engine simulates the same scene.
     Crossed,
-    /// Step, contacts, masses, servos and tracker are all a little off; see
+    /// Step, contacts, masses, servos and tracker are all slightly off; see
     /// [`PerturbationRanges`](crate::PerturbationRanges).
     Perturbed,
-    /// The scene has another object, as the task says.
+    /// The scene has another object, which the task defines.
     StandIn,
-    /// What a user made of it: an engine, a model file or effects that were named one by one.
+    /// Defined by the user: an engine, a model file or single effects.
     Custom,
 }
 

@@ -1,8 +1,8 @@
 //! Kinds of real worlds: how a simulated real world differs from the method's simulator.
 //!
-//! Where a method is tried in the simulator that it identifies with, its model is right but for the
-//! unknowns. Its errors there say nothing of a real world. So there are five kinds, and a result says
-//! which one it is from:
+//! If a method is tested in the simulator that it identifies with, its model is correct except for
+//! the unknowns, so its errors there say nothing about a real world. There are therefore five
+//! kinds, and a result states its kind:
 //!
 //! - [`WorldKind::Matched`]: the simulator itself, with a hidden truth.
 //! - [`WorldKind::Crossed`]: the same scene in another engine.
@@ -10,10 +10,10 @@
 //! - [`WorldKind::StandIn`]: the task's scene with another object.
 //! - [`WorldKind::Custom`]: an engine, a model file or effects that a user named one by one.
 //!
-//! A perturbed world comes about in three modules: `ranges` says how far off it may be, `drawn` has the
-//! values that its seed drew, and `applied` gives them to a scene.
+//! Three modules make a perturbed world: `ranges` defines how far off it may be, `drawn` holds the
+//! values drawn by its seed, and `applied` applies them to a scene.
 //!
-//! Each world has random streams of its own, which no part of a method can reach.
+//! Each world has its own random streams, which no part of a method can reach.
 
 mod applied;
 mod crossed;

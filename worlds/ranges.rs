@@ -1,47 +1,54 @@
-//! How far off a perturbed world may be.
+//! Ranges of the errors of a perturbed world.
 
 use asid_core::{Error, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Ranges that a perturbed world is drawn from, `[low, high]` each, uniformly; factors evenly on a
-/// logarithmic scale. A range of one value is that value; the null value switches a part off.
+/// Ranges that a perturbed world is drawn from, `[low, high]` each: uniformly, or log-uniformly for
+/// factors.
 ///
-/// They are chosen so that each is what a laboratory with a calibrated arm and a motion-capture system would
-/// have to admit to, and none alone spoils an experiment. Sources are named where there is one; the others are
-/// estimates, and say so.
+/// A range of one value is that value; the null value switches a part off.
+///
+/// Each range is what a laboratory with a calibrated arm and a motion-capture system would have to
+/// admit to, and none alone spoils an experiment. Sources are named where there is one; the others
+/// are marked as estimates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PerturbationRanges {
-    /// Physics steps of the world in one of the simulator's. Default 2: half the step, as nature is
-    /// integrated finer than any model. 1 for the same step.
+    /// Physics steps of the world per step of the simulator. Default 2: half the step, as nature
+    /// has a finer resolution than any model. 1 for the same step.
     pub steps: usize,
-    /// Factor of the time constant of every contact (`solref`), 1. Default 0.7 to 1.4: softness is the number of a
-    /// scene that is chosen and not measured (estimate). 1 is null.
+    /// Factor on the time constant of every contact (`solref`), 1. Default 0.7 to 1.4: a scene's
+    /// contact softness is usually chosen and not measured (estimate). 1 is null.
     pub contact_time: [f64; 2],
-    /// Factor of the damping ratio of every contact, 1. Default 0.7 to 1.4, as for the time constant (estimate).
-    /// 1 is null.
+    /// Factor on the damping ratio of every contact, 1. Default 0.7 to 1.4, as for the time
+    /// constant (estimate). 1 is null.
     pub contact_damping: [f64; 2],
-    /// Time constant of a first-order lag between commands and servos, s. Default 0 to 0.01. The low-pass filter
-    /// that libfranka puts on commands has 1.6 ms (100 Hz, `kDefaultCutoffFrequency`) and is commonly set lower; the
-    /// rest is the joints' torque loops (estimate). 0 is null.
+    /// Time constant of a first-order lag between commands and servos, s. Default 0 to 0.01. The
+    /// low-pass filter that libfranka applies to commands has 1.6 ms (100 Hz,
+    /// `kDefaultCutoffFrequency`) and is commonly set slower; the rest is due to the joints' torque
+    /// loops (estimate). 0 is null.
     pub servo_lag: [f64; 2],
-    /// Factor of the mass of what lies free, 1. Default 0.97 to 1.03: a kitchen scale reads to 1 g, 0.5 to 5 % of
-    /// objects of 200 to 20 g. 1 is null.
+    /// Factor on the mass of free bodies, 1. Default 0.97 to 1.03: a kitchen scale reads to 1 g,
+    /// which is 0.5 to 5 % of objects of 200 to 20 g. 1 is null.
     pub mass: [f64; 2],
-    /// Age of a tracker's reading, s. Default 0 to 0.02. Measured from end to end: 6 to 7 ms (Qualisys at ETH Zurich),
-    /// some 25 ms with a usual network behind it (NIME 2021); drivers take out the part that they know. 0 is null.
+    /// Age of a tracker's reading, s. Default 0 to 0.02. Measured end to end: 6 to 7 ms (Qualisys
+    /// at ETH Zurich), some 25 ms with a usual network behind it (NIME 2021); drivers compensate
+    /// the part that they know. 0 is null.
     pub tracker_latency: [f64; 2],
-    /// Length of the constant error of each tracked position, m; its direction is drawn evenly. Default 0 to 0.002:
-    /// registering a tracker with the arm's base leaves 1 to 2 mm (estimate). 0 is null.
+    /// Length of the constant error of each tracked position, m; its direction is uniformly random.
+    /// Default 0 to 0.002: registering a tracker with the arm's base leaves 1 to 2 mm (estimate). 0
+    /// is null.
     pub tracker_offset: [f64; 2],
-    /// Angle of the constant error of each tracked orientation, rad; its axis is drawn evenly. Default 0 to 0.01:
-    /// a millimetre where markers are 0.1 m apart (estimate). 0 is null.
+    /// Angle of the constant error of each tracked orientation, rad; its axis is uniformly random.
+    /// Default 0 to 0.01: a millimetre where markers are 0.1 m apart (estimate). 0 is null.
     pub tracker_rotation: [f64; 2],
-    /// Frames from one reading to the next, whole numbers. Default 1 to 1: frames are 10 to 20 ms, motion capture runs
-    /// at 100 Hz and more. 2 for a camera of 30 Hz, whose frames between are then missing.
+    /// Frames from one reading to the next, whole numbers. Default 1 to 1: frames are 10 to 20 ms,
+    /// and motion capture runs at 100 Hz or more. 2 for a 30 Hz camera; the frames between are then
+    /// missing.
     pub tracker_every: [usize; 2],
-    /// Share of readings that are lost. Default 0 to 0.02: the arm is in the way now and then (estimate). 0 is null.
+    /// Share of readings that are lost. Default 0 to 0.02: the arm sometimes blocks the view
+    /// (estimate). 0 is null.
     pub tracker_dropout: [f64; 2],
 }
 
@@ -65,11 +72,11 @@ impl Default for PerturbationRanges {
 /// Key of the section in a configuration.
 const SECTION: &str = "real.perturbation";
 
-/// Largest number of physics steps in one of the simulator's.
+/// Largest number of physics steps per step of the simulator.
 const MAX_STEPS: usize = 100;
 
 impl PerturbationRanges {
-    /// Ranges that are off: the world is the simulator, in everything that they rule.
+    /// Null ranges: in everything that they govern the world equals the simulator.
     #[must_use]
     pub fn off() -> Self {
         Self {
@@ -114,7 +121,7 @@ impl PerturbationRanges {
                 format!("[{low}, {high}] is no range of whole numbers from 1 up"),
             );
         }
-        // Limits: a factor is positive, a time or length not negative.
+        // Limits: a factor is positive; a time or length is not negative.
         for (key, [low, high], [least, most]) in [
             ("contact_time", self.contact_time, [0.01, 100.0]),
             ("contact_damping", self.contact_damping, [0.01, 100.0]),

@@ -30,18 +30,18 @@ use pairs::{Pairs, note};
 use tracker::Tracker;
 pub use tracker::TrackerErrors;
 
-/// The simulation that is the world.
+/// Index of the simulation that is the world.
 const WORLD: usize = 0;
 
-/// The simulation beside it that is looked at closely.
+/// Index of the copy that is read after every physics step.
 const COPY: usize = 1;
 
 /// A simulator with a hidden truth, its own start poses and noisy trackers.
 ///
-/// Everything that chance decides in it has a stream of its own: the start pose and the noise of
-/// an exploration (`exploration start`, `exploration noise`), of an attempt (`task start`, `task noise`), wear
-/// (`wear`, one index a play) and what the tracker loses. So the numbers that a method meets do not
-/// depend on what it did before: methods with the same seed meet the same chance.
+/// Everything random in it has its own stream: the start pose and the noise of an exploration
+/// (`exploration start`, `exploration noise`) and of an attempt (`task start`, `task noise`), wear
+/// (`wear`, one index per play), and lost tracker readings. The random numbers that a method meets
+/// therefore do not depend on its earlier actions: methods with the same seed meet the same ones.
 pub struct SimulatedWorld<'a> {
     task: &'a dyn Task,
     parameters: &'a [Parameter],
@@ -50,17 +50,18 @@ pub struct SimulatedWorld<'a> {
     truth: Vec<f64>,
     streams: Streams,
     tracker: TrackerErrors,
-    /// Episodes and attempts played.
+    /// Number of episodes and attempts played.
     plays: u64,
     start: Option<Vec<f64>>,
 }
 
 impl<'a> SimulatedWorld<'a> {
-    /// A world of `model` whose `parameters` have the values `truth` and whose trackers
-    /// have the noise of `signals`; `streams` draws start poses and noise.
+    /// A world of `model` in which `parameters` have the values `truth`.
+    ///
+    /// Its trackers have the noise of `signals`; start poses and noise are drawn from `streams`.
     ///
     /// # Errors
-    /// When the model is not one of the task's scene.
+    /// When the model is not that of the task's scene.
     pub fn new(
         task: &'a dyn Task,
         model: &dyn Model,
@@ -97,24 +98,24 @@ impl<'a> SimulatedWorld<'a> {
         })
     }
 
-    /// The same world with a tracker that has systematic errors, in exploration and in attempts.
+    /// Adds systematic errors to the tracker, in exploration and in attempts.
     ///
     /// # Errors
-    /// When the errors make no sense or are not those of the signals that are tracked.
+    /// When the errors make no sense or do not match the tracked signals.
     pub fn with_tracker(mut self, tracker: TrackerErrors) -> Result<Self> {
         tracker.check(&self.signals)?;
         self.tracker = tracker;
         Ok(self)
     }
 
-    /// The same world, whose exploration episode begins with this start pose.
+    /// Fixes the start pose of the exploration episode.
     #[must_use]
     pub fn with_exploration_start(mut self, start: Vec<f64>) -> Self {
         self.start = Some(start);
         self
     }
 
-    /// The start pose that the world will begin its exploration episode with.
+    /// The start pose with which the exploration episode will begin.
     #[must_use]
     pub fn exploration_start(&self) -> Vec<f64> {
         self.start.clone().unwrap_or_else(|| {
@@ -130,7 +131,7 @@ impl<'a> SimulatedWorld<'a> {
         counter.fetch_add(self.batch.simulator.steps_taken(), Ordering::Relaxed);
     }
 
-    /// The true values as they are by now.
+    /// The present true values, wear included.
     #[must_use]
     pub fn truth(&self) -> &[f64] {
         &self.truth
@@ -150,7 +151,7 @@ impl<'a> SimulatedWorld<'a> {
         self.batch.place(self.task, &[WORLD], start)
     }
 
-    /// An error of a parameter that an engine refuses, as one of the truth that was asked for.
+    /// Turns an engine's refusal of a parameter into an error about the requested truth.
     fn of_truth(&self, error: Error) -> Error {
         let Error::Parameter { parameter, message } = error else {
             return error;
@@ -167,7 +168,8 @@ impl<'a> SimulatedWorld<'a> {
         }
     }
 
-    /// Whether the simulation goes on; one that a plugin's effect ended does not count.
+    /// Fails where a plugin's effect ended the simulation; a simulation that diverged by itself
+    /// passes.
     fn check(&self) -> Result<()> {
         match &self.batch.simulator.status()[WORLD] {
             Status::Diverged { message, .. } if blames_a_plugin(message) => {
@@ -178,7 +180,7 @@ impl<'a> SimulatedWorld<'a> {
     }
 }
 
-/// A log without rows.
+/// An empty log.
 fn blank(layout: &Layout, channels: &[String]) -> Result<Episode> {
     let columns = |name: &String| -> Result<ChannelColumns> {
         Ok(ChannelColumns {
@@ -233,7 +235,7 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut true_readings = row.clone();
         tracker.read(&mut row);
         episode.readings.extend_from_slice(&row);
-        // The policy goes on with the last reading where one is missing, as a tracker's driver does.
+        // Where a reading is missing the policy keeps the last one, as a tracker's driver does.
         let mut latest = row;
         let mut action = vec![0.0; protocol.action.len()];
         let mut ctrl = vec![0.0; frames * nu];
@@ -305,7 +307,7 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut action = vec![0.0; protocol.action.len()];
         policy.act(&believed, &mut action)?;
         let ctrl = self.task.attempt(&believed, &action)?;
-        // The metric's channels, then those of the log.
+        // Channels of the metric first, then those of the log.
         let names = self.task.exploration().channels();
         let mut all = protocol.channels.clone();
         all.extend(names.iter().cloned());

@@ -1,4 +1,4 @@
-//! What runs come to, from the folders that `asid run` writes: the figures of the tasks' pages that no
+//! Summarises runs from the folders that `asid run` writes: the figures on the tasks' pages that no
 //! table of `asid compare` shows.
 //!
 //!     cargo run -p asid-tasks --example figures -- runs/patches-*
@@ -53,7 +53,8 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// Errors of each unknown beside what its posterior expects, and how often the interval holds the truth.
+/// Prints each unknown's error next to its posterior's expectation, and the coverage of its
+/// interval.
 fn unknowns(runs: &[Run]) {
     let of = |run: &Run| run.result["parameters"].as_array().cloned();
     let count = runs.first().and_then(of).map_or(0, |p| p.len());
@@ -95,7 +96,8 @@ fn unknowns(runs: &[Run]) {
     }
 }
 
-/// How far the joint that is found from the tracked parts is from the laptop's hinge.
+/// Prints the error of the joint that is found from the tracked parts, relative to the laptop's
+/// hinge.
 fn joints(runs: &[Run]) {
     let (mut axes, mut origins, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
     for run in runs {
@@ -110,7 +112,7 @@ fn joints(runs: &[Run]) {
         let vector = |name: &str| [0, 1, 2].map(|k| number(&found[name][k]));
         let (axis, origin) = (vector("axis"), vector("origin"));
         axes.push(axis[0].abs().min(1.0).acos().to_degrees());
-        // The hinge is along x, so its distance is that in y and z.
+        // The hinge is along x, so the distance is measured in y and z.
         let hinge = laptop_articulation::hinge(number(&unknowns[1]["truth"]));
         origins.push((origin[1] - hinge[1]).hypot(origin[2] - hinge[2]));
     }
@@ -133,7 +135,7 @@ fn joints(runs: &[Run]) {
     }
 }
 
-/// The share of the episode that the ball spends in each patch.
+/// Prints the share of the episode that the ball spends in each patch.
 fn visits(run: &Run) -> Result<(), Box<dyn Error>> {
     let places = column(&run.folder.join("real.csv"), "ball_pos.1")?;
     let share = |patch: usize| {

@@ -1,4 +1,4 @@
-//! The scene of a task from above, to scale, as SVG on standard output:
+//! Draws a task's scene from above, to scale, as SVG on standard output:
 //!
 //!     cargo run -p asid-tasks --example top_view -- shuffleboard > docs/images/shuffleboard.svg
 
@@ -13,7 +13,7 @@ use asid_tasks as _;
 /// Width of the picture, pixels.
 const WIDTH: f64 = 760.0;
 
-/// Fills of the fixtures, in their order.
+/// Fill colours of the fixtures, in their order.
 const FILLS: [&str; 6] = [
     "#ead9bd", "#f2d95c", "#7fa7dd", "#b9d8a8", "#d9b8d8", "#c9c9c9",
 ];
@@ -25,7 +25,7 @@ fn main() -> asid_core::Result<()> {
     Ok(())
 }
 
-/// x to the right and y up, as seen from above.
+/// Draws the top view with x to the right and y up.
 fn svg(task: &dyn Task) -> String {
     let view = &task.spec().top_view;
     let [low, high] = view.bounds;

@@ -1,4 +1,4 @@
-//! The task's primitive: go behind the lid, push it towards the base, leave it there.
+//! The task's motion primitive: move behind the lid, push it towards the base, and leave it there.
 
 use asid_core::task::Coordinate;
 use asid_core::{Result, Scene};
@@ -11,10 +11,10 @@ use crate::panda;
 /// Length of a frame, s.
 pub const FRAME_PERIOD: f64 = 0.02;
 
-/// Where the hand begins, behind the hinge, m.
+/// Start position of the hand behind the hinge, m.
 const BEHIND: f64 = 0.10;
 
-/// Phases of the motion: name and seconds.
+/// Phases of the motion: name and duration, s.
 const PHASES: [(&str, f64); 5] = [
     ("approach", 0.9),
     ("push", 1.4),
@@ -23,12 +23,12 @@ const PHASES: [(&str, f64); 5] = [
     ("wait", 0.3),
 ];
 
-/// How far in front of the hinge the hand is pushed, m.
+/// The action: how far in front of the hinge the hand stops its push, m.
 pub fn action() -> Vec<Coordinate> {
     vec![Coordinate::new("reach", "m", [0.0, 0.12])]
 }
 
-/// The laptop stands with its hinge towards the arm, open.
+/// Start poses: the laptop stands open, with its hinge towards the arm.
 pub fn start() -> Vec<Coordinate> {
     let quarter = std::f64::consts::FRAC_PI_2;
     vec![
@@ -43,7 +43,7 @@ fn phase_frames(seconds: f64) -> usize {
     (seconds / FRAME_PERIOD).round() as usize
 }
 
-/// Frames of an attempt.
+/// Number of frames of an attempt.
 pub fn frames() -> usize {
     PHASES.iter().map(|p| phase_frames(p.1)).sum()
 }
@@ -61,8 +61,10 @@ pub fn phases() -> Vec<(String, f64, f64)> {
         .collect()
 }
 
-/// Commands of an attempt, `frames x actuators`, for a laptop believed to stand at
-/// `start` (x, y, yaw, lid) and a hand that stops `reach` (m) in front of the hinge.
+/// Commands of an attempt, `frames x actuators`.
+///
+/// The laptop is believed to stand at `start` (x, y, yaw, lid); the hand stops `reach` (m) in front
+/// of the hinge.
 pub fn commands(scene: &Scene, home: &[f64], start: &[f64], reach: f64) -> Result<Vec<f64>> {
     let mut controller = CartesianController::new(
         scene,
@@ -72,7 +74,7 @@ pub fn commands(scene: &Scene, home: &[f64], start: &[f64], reach: f64) -> Resul
     )?;
     let height = controller.position().z;
     let (sin, cos) = start[2].sin_cos();
-    // The hinge is at the base's +y edge; in front of it is -y.
+    // The hinge is at the base's +y edge; the front is towards -y.
     let in_front = |way: f64| {
         let y = PLATE_HALF[1] - way;
         Vector3::new(start[0] - sin * y, start[1] + cos * y, height)
@@ -93,7 +95,7 @@ pub fn commands(scene: &Scene, home: &[f64], start: &[f64], reach: f64) -> Resul
     Ok(ctrl)
 }
 
-/// The polynomial from 0 to 1 of least jerk (Flash and Hogan 1985).
+/// Minimum-jerk polynomial from 0 to 1 (Flash and Hogan 1985).
 fn minimum_jerk(u: f64) -> f64 {
     u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 }

@@ -1,4 +1,4 @@
-//! When closing the lid succeeds: the lid's angle, from the poses of base and lid.
+//! Success of closing the lid: the lid's angle, from the poses of base and lid.
 
 use asid_core::signal::{unit_quaternion, yaw};
 use asid_core::task::{Outcome, Outline};
@@ -9,25 +9,25 @@ use super::PLATE_HALF;
 /// Entries of a row: position and orientation of the base, then of the lid.
 pub const WIDTH: usize = 14;
 
-/// Angle that the lid is to be closed to, rad.
+/// Target angle of the lid, rad.
 pub const SET_ANGLE: f64 = 0.8;
 
 /// Smallest motion of the lid that counts as moved, rad.
 pub const MIN_MOTION: f64 = 0.01;
 
-/// Angle of the lid: 0 closed, pi/2 upright, up to 2 pi.
+/// Angle of the lid, rad: 0 closed, pi/2 upright, up to 2 pi.
 pub fn lid_angle(row: &[f64]) -> f64 {
     let lid = unit_quaternion(&row[3..7]).inverse() * unit_quaternion(&row[10..14]);
-    // The hinge's axis is -x; what the noise turns about other axes does not count.
+    // The hinge's axis is -x; rotations about other axes are noise and do not count.
     (-2.0 * lid.i.atan2(lid.w)).rem_euclid(std::f64::consts::TAU)
 }
 
-/// Base's place and heading, and the lid's angle.
+/// Position and heading of the base, and the lid's angle.
 pub fn locate(row: &[f64]) -> Vec<f64> {
     vec![row[0], row[1], yaw(&row[3..7]), lid_angle(row)]
 }
 
-/// Distance of the lid from the set angle, rad, a row each.
+/// Absolute difference of the lid's angle from the target, rad, per row.
 pub fn errors(readings: &[f64]) -> Vec<f64> {
     readings
         .chunks_exact(WIDTH)
@@ -35,7 +35,7 @@ pub fn errors(readings: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What came of an attempt: the error in the last row, at most `tolerance` (rad) in a success, and
+/// Outcome of an attempt: the error in the last row, at most `tolerance` (rad) for a success, and
 /// whether the lid moved at all.
 pub fn outcome(readings: &[f64], tolerance: f64) -> Outcome {
     let (first, last) = (&readings[..WIDTH], &readings[readings.len() - WIDTH..]);
@@ -56,7 +56,7 @@ pub fn outcome(readings: &[f64], tolerance: f64) -> Outcome {
     }
 }
 
-/// Base and lid seen along the hinge: depth from the hinge to the front, and height.
+/// Side view of base and lid along the hinge: depth from the hinge to the front, and height.
 pub fn side_view(row: &[f64]) -> Vec<Outline> {
     let heading = yaw(&row[3..7]);
     let front = Vector3::new(heading.sin(), -heading.cos(), 0.0);
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
     use nalgebra::UnitQuaternion;
 
-    /// Base at a heading, lid at an angle.
+    /// Row with the base at a heading and the lid at an angle.
     fn row(heading: f64, angle: f64) -> Vec<f64> {
         let base = UnitQuaternion::from_scaled_axis(Vector3::z() * heading);
         let lid = base * UnitQuaternion::from_scaled_axis(-Vector3::x() * angle);

@@ -1,11 +1,11 @@
-//! Laptop articulation: find whether a laptop's lid turns, and about which axis, by
-//! pushing it; then close it to a set angle.
+//! Laptop articulation: find whether a laptop's lid turns, and about which axis, by pushing it;
+//! then close it to a set angle.
 //!
-//! Base and lid are plates of 0.30 x 0.20 x 0.01 m. `articulated` says whether the hinge
-//! gives way to the hand or holds; `hinge_offset` is how far above the rear edge's
-//! nominal place its axis lies. The closed gripper is swept at a fixed height over the
-//! table. The task's action is how far in front of the hinge the hand stops when it
-//! closes the lid: where the lid then stands depends on the axis.
+//! Base and lid are plates of 0.30 x 0.20 x 0.01 m. `articulated` says whether the hinge yields to
+//! the hand or holds. `hinge_offset` is the height of its axis above the nominal position at the
+//! rear edge. The closed gripper sweeps over the table at a fixed height. The task's action is the
+//! distance in front of the hinge at which the hand stops when it closes the lid; the lid's final
+//! angle depends on the axis.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
@@ -29,19 +29,19 @@ use crate::steering::{self, Steering};
 /// Half sizes of base and lid: along the hinge, across it, thickness, m.
 const PLATE_HALF: [f64; 3] = [0.15, 0.1, 0.005];
 
-/// Dry friction of a hinge that holds, and of one that gives way to a hand, N m.
+/// Dry friction of a hinge that holds, and of one that yields to a hand, N m.
 const HINGE_FRICTION: [f64; 2] = [200.0, 0.3];
 
 /// Largest distance of the hinge's axis from its nominal height, m.
 const MAX_OFFSET: f64 = 0.02;
 
-/// Largest error of a success unless the difficulty says otherwise, rad.
+/// Largest angle error of a success unless the difficulty sets another, rad.
 const ANGLE_TOLERANCE: f64 = 0.05;
 
-/// Speed of the hand unless the difficulty says otherwise, m/s.
+/// Speed of the hand unless the difficulty sets another, m/s.
 const HAND_SPEED: f64 = 0.5;
 
-/// The closed gripper is swept over the base, at a height at which it meets the lid.
+/// Workspace of the closed gripper: it sweeps over the base at a height at which it meets the lid.
 const STEERING: Steering = Steering {
     speed: HAND_SPEED,
     x: [0.25, 0.75],
@@ -50,8 +50,9 @@ const STEERING: Steering = Steering {
     fingers: 0.0,
 };
 
-/// A point of the hinge's axis in the base's frame, m, with the axis `hinge_offset` (m) above its
-/// nominal place; the axis is along x.
+/// A point of the hinge's axis in the base's frame, m.
+///
+/// The axis is along x and lies `hinge_offset` (m) above its nominal position.
 #[must_use]
 pub fn hinge(hinge_offset: f64) -> [f64; 3] {
     [0.0, PLATE_HALF[1], 0.015 + hinge_offset]
@@ -79,12 +80,12 @@ impl LaptopArticulation {
     /// The task with its published ranges.
     ///
     /// # Errors
-    /// When the scene that is built in cannot be read.
+    /// When the built-in scene cannot be read.
     pub fn new() -> Result<Self> {
         Self::at(Levels::new(difficulties()))
     }
 
-    /// The task at some difficulty.
+    /// The task at the given difficulty levels.
     fn at(levels: Levels) -> Result<Self> {
         let (scene, home) = panda::scene(NAME, include_str!("scene.xml"))?;
         let angle_tolerance = levels.get("angle_tolerance")?;
@@ -150,14 +151,14 @@ impl LaptopArticulation {
     }
 }
 
-/// Pairs of bodies that touch where the hand touches a part.
+/// Pairs of bodies that touch when the hand touches a part.
 fn hand_on(part: &str) -> Vec<[String; 2]> {
     ["finger_left", "finger_right", "hand"]
         .map(|body| [body.into(), part.into()])
         .into()
 }
 
-/// Whether the lid turns, and about which axis.
+/// The unknowns: whether the lid turns, and about which axis.
 fn parameters() -> Vec<Parameter> {
     vec![
         Parameter {
@@ -177,7 +178,7 @@ fn parameters() -> Vec<Parameter> {
     ]
 }
 
-/// Both parts. The lid is drawn as it is seen when it stands upright.
+/// Both parts for the top view; the lid is drawn as it looks when it stands upright.
 fn objects() -> Vec<TrackedObject> {
     let [x, y, z] = PLATE_HALF;
     [("base", y), ("lid", z)]
@@ -194,7 +195,7 @@ fn objects() -> Vec<TrackedObject> {
         .into()
 }
 
-/// The base from above.
+/// Top view with the base.
 fn top_view() -> TopView {
     let [x, y, _] = PLATE_HALF;
     TopView {
@@ -207,7 +208,7 @@ fn top_view() -> TopView {
     }
 }
 
-/// What makes the task easier or harder.
+/// Difficulties of the task.
 fn difficulties() -> Vec<Difficulty> {
     let about = "largest error of the lid's angle that is a success";
     let mut all = vec![
@@ -230,9 +231,12 @@ impl Task for LaptopArticulation {
         &self.spec
     }
 
-    /// How far a push turns the lid is luck, and where the parts then lie to each other is not:
-    /// readings are weighed by how roughness runs along the episode. Some pushes leave the axis known to
-    /// millimetres: the reach is judged by more samples of the belief, and searched for among more.
+    /// Settings that suit the task better than the defaults.
+    ///
+    /// The angle to which a push turns the lid is random; the relative pose of the parts is not.
+    /// Readings are therefore weighted by the whole covariance of the roughness along the episode.
+    /// Some pushes determine the axis to millimetres: the solver uses more samples of the belief
+    /// and more candidate actions.
     fn settings(&self, section: &str, algorithm: &str) -> Settings {
         let mut settings = Settings::new();
         match (section, algorithm) {

@@ -1,4 +1,4 @@
-//! When balancing succeeds: the tilt of the rod, from its pose.
+//! Success of balancing: the tilt of the rod, from its pose.
 
 use asid_core::signal::unit_quaternion;
 use asid_core::task::{Outcome, Outline};
@@ -10,20 +10,21 @@ use crate::rectangle;
 /// Largest tilt of a success, degrees.
 pub const MAX_TILT: f64 = 5.0;
 
-/// Added to the cost where the rod has left the ledge, degrees (the published code's reward is -10 then).
+/// Cost added where the rod has left the ledge, degrees (the published code's reward is -10 in this
+/// case).
 const DROP_COST: f64 = 10.0;
 
-/// How far the rod's middle may be from its rest height on the ledge, m.
+/// Largest distance of the rod's middle from its rest height on the ledge, m.
 const HEIGHT_TOLERANCE: f64 = 0.005;
 
-/// Tilt of the rod's long axis against the horizontal, degrees, from a row of
-/// position and orientation.
+/// Tilt of the rod's long axis against the horizontal, degrees, from a row of position and
+/// orientation.
 pub fn tilt_deg(row: &[f64]) -> f64 {
     let axis = unit_quaternion(&row[3..7]) * Vector3::y();
     axis.z.clamp(-1.0, 1.0).asin().abs().to_degrees()
 }
 
-/// What came of an attempt: the tilt in the last row.
+/// Outcome of an attempt: the tilt in the last row.
 pub fn outcome(readings: &[f64]) -> Outcome {
     let last = &readings[readings.len() - 7..];
     if last.iter().any(|x| !x.is_finite()) {
@@ -42,7 +43,7 @@ pub fn outcome(readings: &[f64]) -> Outcome {
     }
 }
 
-/// Ledge, of a width in m, and rod in the plane of x and z.
+/// Side view in the x-z plane: the ledge, of a width in m, and the rod.
 pub fn side_view(row: &[f64], ledge_width: f64) -> Vec<Outline> {
     let axis = unit_quaternion(&row[3..7]) * Vector3::y();
     let (along, up) = (axis.x.hypot(axis.y).copysign(axis.x), axis.z);
@@ -83,7 +84,7 @@ mod tests {
         for tilt in [0.0, 3.0, 45.0, 90.0] {
             assert!((tilt_deg(&row(0.17, tilt)) - tilt).abs() < 1e-6);
         }
-        // Turning about the vertical does not tilt.
+        // A rotation about the vertical does not tilt the rod.
         let half = 0.4_f64;
         assert!(tilt_deg(&[0.0, 0.0, 0.0, half.cos(), 0.0, 0.0, half.sin()]) < 1e-9);
     }

@@ -1,12 +1,11 @@
-//! Rod balancing: find where a rod carries its mass by pushing it, then lay it on
-//! a ledge so that it stays level.
+//! Rod balancing: find the offset of a rod's centre of mass by pushing it, then lay it on a ledge
+//! so that it stays level.
 //!
-//! The rod is 0.04 x 0.3 x 0.04 m: 0.05 kg spread along it and 0.15 kg at
-//! `mass_offset`, so that its centre of mass lies at three quarters of that. The
-//! closed gripper pushes it about on a table; how it turns tells the offset. The
-//! task's action is the point along the rod at which it is picked and which is
-//! laid over the middle of a ledge 0.04 m wide. Everything is done by simulated
-//! contact, and the tilt is read from the rod's pose.
+//! The rod is 0.04 x 0.3 x 0.04 m: 0.05 kg are spread along it and 0.15 kg sit at `mass_offset`.
+//! Its centre of mass therefore lies at three quarters of that offset. The closed gripper pushes it
+//! around on a table; its rotation reveals the offset. The task's action is the point along the rod
+//! at which it is picked up and which is laid over the middle of a ledge 0.04 m wide. All motion is
+//! by simulated contact, and the tilt is read from the rod's pose.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
@@ -28,10 +27,10 @@ use crate::difficulty;
 use crate::panda;
 use crate::steering::{self, Steering};
 
-/// Speed of the hand unless the difficulty says otherwise, m/s. Faster pushes make the rod hop.
+/// Speed of the hand unless the difficulty sets another, m/s. Faster pushes make the rod hop.
 const HAND_SPEED: f64 = 0.4;
 
-/// The closed gripper pushes the rod about on the table.
+/// Workspace of the closed gripper, which pushes the rod around on the table.
 const STEERING: Steering = Steering {
     speed: HAND_SPEED,
     x: [0.30, 0.70],
@@ -49,10 +48,10 @@ const LEDGE: [f64; 3] = [0.2, -0.5, 0.15];
 /// Half length of the ledge and half its height, m.
 const LEDGE_HALF: [f64; 2] = [0.05, 0.075];
 
-/// Width of the ledge unless the difficulty says otherwise, m.
+/// Width of the ledge unless the difficulty sets another, m.
 const LEDGE_WIDTH: f64 = 0.04;
 
-/// Height of the rod's middle when it lies on the table, m.
+/// Height of the rod's middle when it rests on the table, m.
 const ROD_REST_HEIGHT: f64 = 0.02;
 
 /// The task.
@@ -76,12 +75,12 @@ impl RodBalancing {
     /// The task with its published ranges.
     ///
     /// # Errors
-    /// When the scene that is built in cannot be read.
+    /// When the built-in scene cannot be read.
     pub fn new() -> Result<Self> {
         Self::at(Levels::new(difficulties()))
     }
 
-    /// The task at some difficulty.
+    /// The task at the given difficulty levels.
     fn at(levels: Levels) -> Result<Self> {
         let (scene, home) = panda::scene(NAME, include_str!("scene.xml"))?;
         let ledge_width = levels.get("ledge_width")?;
@@ -138,7 +137,7 @@ impl RodBalancing {
     }
 }
 
-/// Where the rod carries its mass.
+/// The unknown offset of the rod's mass.
 fn mass_offset() -> Parameter {
     Parameter {
         name: "mass_offset".into(),
@@ -149,8 +148,8 @@ fn mass_offset() -> Parameter {
     }
 }
 
-/// Friction of the rod. The table's own coefficient is the smallest of the range, so that the rod's wins
-/// everywhere in it.
+/// Optional unknown: friction of the rod. The table's own coefficient is the lower end of the
+/// range, so that the rod's coefficient prevails everywhere in it.
 fn friction() -> Parameter {
     Parameter {
         name: "friction".into(),
@@ -161,7 +160,7 @@ fn friction() -> Parameter {
     }
 }
 
-/// Rod and ledge from above.
+/// Top view of rod and ledge.
 fn top_view(ledge_width: f64) -> TopView {
     let [x, y, _] = ROD_HALF;
     TopView {
@@ -177,7 +176,7 @@ fn top_view(ledge_width: f64) -> TopView {
     }
 }
 
-/// What makes the task easier or harder.
+/// Difficulties of the task.
 fn difficulties() -> Vec<Difficulty> {
     let about = "width of the ledge that the rod is laid across";
     let mut all = vec![
@@ -199,7 +198,8 @@ impl Task for RodBalancing {
         Ok(Some(Box::new(Self::at(levels)?)))
     }
 
-    /// Another rod: shorter, a quarter heavier, rougher below, and with its mass less at one place.
+    /// Another rod: shorter, a quarter heavier, with more friction below, and with its mass less
+    /// concentrated.
     fn stand_in(&self) -> Result<Option<Scene>> {
         stand_in::scene(&self.spec.scene).map(Some)
     }

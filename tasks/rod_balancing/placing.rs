@@ -1,4 +1,4 @@
-//! The task's primitive: pick the rod at a point, lay that point over the ledge, let go.
+//! The task's motion primitive: pick the rod at a point, lay that point over the ledge, let go.
 
 use asid_core::task::Coordinate;
 use asid_core::{Result, Scene};
@@ -11,13 +11,13 @@ use crate::panda::{self, FINGER_OPEN};
 /// Length of a frame, s.
 pub const FRAME_PERIOD: f64 = 0.02;
 
-/// Height of the pads' middle when they grip the rod on the table, m.
+/// Height of the finger pads' middle when they grip the rod on the table, m.
 const GRIP_HEIGHT: f64 = 0.02;
 
-/// How far above the ledge the rod's underside is let go, m.
+/// Gap between the ledge and the rod's underside at release, m.
 const RELEASE_GAP: f64 = 0.0005;
 
-/// Phases of the motion: name, seconds, finger command at the end.
+/// Phases of the motion: name, duration (s), finger command at the end.
 const PHASES: [(&str, f64, f64); 10] = [
     ("above", 0.70, FINGER_OPEN),
     ("down", 0.25, FINGER_OPEN),
@@ -31,7 +31,8 @@ const PHASES: [(&str, f64, f64); 10] = [
     ("wait", 1.00, FINGER_OPEN),
 ];
 
-/// The rod waits along the x axis, so that the gripper closes across it without turning the wrist.
+/// Start poses: the rod lies along the x axis, so that the gripper closes across it without a turn
+/// of the wrist.
 pub fn start() -> Vec<Coordinate> {
     let quarter = std::f64::consts::FRAC_PI_2;
     vec![
@@ -41,12 +42,12 @@ pub fn start() -> Vec<Coordinate> {
     ]
 }
 
-/// Frames of each phase.
+/// Number of frames of a phase.
 fn phase_frames(seconds: f64) -> usize {
     (seconds / FRAME_PERIOD).round() as usize
 }
 
-/// Frames of an attempt.
+/// Number of frames of an attempt.
 pub fn frames() -> usize {
     PHASES.iter().map(|p| phase_frames(p.1)).sum()
 }
@@ -68,8 +69,10 @@ pub fn phases() -> Vec<(String, f64, f64)> {
         .collect()
 }
 
-/// Commands of an attempt, `frames x actuators`, for a rod believed to lie at `start`
-/// (x, y, yaw) and the point `pick` (m from its middle, along it).
+/// Commands of an attempt, `frames x actuators`.
+///
+/// The rod is believed to lie at `start` (x, y, yaw); `pick` is the point (m from its middle, along
+/// it).
 pub fn commands(scene: &Scene, home: &[f64], start: &[f64], pick: f64) -> Result<Vec<f64>> {
     let mut controller = CartesianController::new(
         scene,
@@ -111,7 +114,7 @@ pub fn commands(scene: &Scene, home: &[f64], start: &[f64], pick: f64) -> Result
     Ok(ctrl)
 }
 
-/// The polynomial from 0 to 1 of least jerk (Flash and Hogan 1985).
+/// Minimum-jerk polynomial from 0 to 1 (Flash and Hogan 1985).
 fn minimum_jerk(u: f64) -> f64 {
     u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 }

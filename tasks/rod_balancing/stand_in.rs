@@ -1,13 +1,18 @@
-//! Another rod, for a real world whose rod is not that of the model.
+//! Another rod, for a real world whose rod differs from the model's.
 //!
-//! The paper's real rods are found objects whose simulated twins have a measured length and a guessed rest. So
-//! this one is 0.28 m long where the model says 0.30, weighs 0.25 kg where it says 0.20, carries 0.70 of
-//! its mass at the offset where it says 0.75, and rubs with 0.25 where it says 0.20. Height and width are the
-//! same: the gripper and the start pose rest on them.
+//! The paper's real rods are found objects whose simulated twins have a measured length and
+//! otherwise guessed properties. This rod therefore differs from the model:
+//!
+//! - It is 0.28 m long instead of 0.30 m.
+//! - It weighs 0.25 kg instead of 0.20 kg.
+//! - It has 0.70 of its mass at the offset instead of 0.75.
+//! - Its friction is 0.25 instead of 0.20.
+//!
+//! Height and width are the same, since the gripper and the start pose depend on them.
 
 use asid_core::{Result, Scene};
 
-/// Half the length of one of the five boxes, m.
+/// Half length of one of the five boxes, m.
 const BOX_HALF: f64 = 0.028;
 
 /// Mass of each box, kg.
@@ -16,10 +21,10 @@ const BOX_MASS: f64 = 0.015;
 /// Mass at the offset, kg.
 const MOVABLE_MASS: f64 = 0.175;
 
-/// Friction with the table.
+/// Friction coefficient with the table.
 const FRICTION: f64 = 0.25;
 
-/// The scene with the other rod.
+/// Returns the scene with the other rod.
 pub fn scene(scene: &Scene) -> Result<Scene> {
     let mut other = scene.with_attribute("geom", "rod_mass", "mass", &MOVABLE_MASS.to_string())?;
     for i in 0..5 {

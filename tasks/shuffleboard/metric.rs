@@ -1,16 +1,16 @@
-//! When a shot succeeds: how far from the zone's middle the puck comes to rest.
+//! Success of a shot: the distance from the zone's middle at which the puck comes to rest.
 
 use asid_core::task::Outcome;
 
 use super::{LANE_HALF, Zone};
 
-/// Way in the last frame below which the puck is at rest, m.
+/// Motion in the last frame below which the puck counts as at rest, m.
 const REST: f64 = 5e-5;
 
-/// Added to the cost where the puck has left the board by its side or still moves, m.
+/// Cost added where the puck has left the board sideways or still moves, m.
 const MISS_COST: f64 = 0.25;
 
-/// The error where the simulation has ended, m.
+/// Error where the simulation has diverged, m.
 const LOST: f64 = 10.0;
 
 /// Distance along the board from the middle of the zone, m.
@@ -18,7 +18,8 @@ pub fn zone_error(zone: Zone, position: &[f64]) -> f64 {
     (position[0] - zone.middle()).abs()
 }
 
-/// What came of an attempt at a zone of a length in m: where the puck is in the last of the rows of three.
+/// Outcome of an attempt for a zone of `zone_length` (m): the puck's position in the last row. Rows
+/// have three entries.
 pub fn outcome(zone: Zone, zone_length: f64, readings: &[f64]) -> Outcome {
     let [before, last] = [6, 3].map(|back| &readings[readings.len().saturating_sub(back)..][..3]);
     if last.iter().chain(before).any(|x| !x.is_finite()) {

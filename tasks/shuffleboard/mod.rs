@@ -1,10 +1,10 @@
 //! Shuffleboard: find how a puck slides by pushing it for two seconds, then shoot it into a zone
 //! with one strike.
 //!
-//! The puck lies on a waxed board; unknown are its sliding and its torsional friction. The closed gripper
-//! is the stick. The task's action is the strength of one strike from behind, and the puck must come to rest
-//! in the near or in the far zone. The real board wears: every shot raises its friction by up to a
-//! few per cent, of which the simulator knows nothing.
+//! The puck lies on a waxed board; its sliding and its torsional friction are unknown. The closed
+//! gripper is the stick. The task's action is the strength of one strike from behind; the puck must
+//! come to rest in the near or in the far zone. The real board wears: every shot raises its
+//! friction by up to a few per cent, which the simulator does not model.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.2 and its appendix.
 
@@ -36,19 +36,19 @@ const PUCK_REST_HEIGHT: f64 = 0.0127;
 /// Middle of the board, m.
 const LANE: [f64; 2] = [0.67, 0.0];
 
-/// Half sizes of the board along and across, m.
+/// Half sizes of the board along and across its length, m.
 const LANE_HALF: [f64; 2] = [0.505, 0.115];
 
-/// Largest rise of the friction in one shot, unless the difficulty says otherwise.
+/// Largest relative rise of the friction in one shot, unless the difficulty sets another.
 const WEAR: f64 = 0.06;
 
-/// Length of each zone along the board unless the difficulty says otherwise, m.
+/// Length of each zone along the board unless the difficulty sets another, m.
 const ZONE_LENGTH: f64 = 0.25;
 
-/// Speed of the hand unless the difficulty says otherwise, m/s.
+/// Speed of the hand unless the difficulty sets another, m/s.
 const HAND_SPEED: f64 = 0.4;
 
-/// The zone that the puck is to come to rest in.
+/// The zone in which the puck must come to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Zone {
     /// x from 0.675 to 0.925 m.
@@ -61,7 +61,7 @@ impl Zone {
     /// Both zones.
     pub const ALL: [Self; 2] = [Self::Near, Self::Far];
 
-    /// Name of the task's condition.
+    /// Name of the zone, which is also that of the task's condition.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -70,7 +70,7 @@ impl Zone {
         }
     }
 
-    /// Where its middle is along the board, m.
+    /// Position of the zone's middle along the board, m.
     #[must_use]
     pub fn middle(self) -> f64 {
         match self {
@@ -80,7 +80,7 @@ impl Zone {
     }
 }
 
-/// The closed gripper moves over the near end of the board.
+/// Workspace of the closed gripper: the near end of the board.
 const STEERING: Steering = Steering {
     speed: HAND_SPEED,
     x: [0.28, 0.50],
@@ -113,12 +113,12 @@ impl Shuffleboard {
     /// The task with this zone as its goal.
     ///
     /// # Errors
-    /// When the scene that is built in cannot be read.
+    /// When the built-in scene cannot be read.
     pub fn new(zone: Zone) -> Result<Self> {
         Self::at(zone, Levels::new(difficulties()))
     }
 
-    /// The task at some difficulty.
+    /// The task at the given difficulty levels.
     fn at(zone: Zone, levels: Levels) -> Result<Self> {
         let (mut scene, home) = panda::scene(NAME, include_str!("scene.xml"))?;
         let zone_length = levels.get("zone_length")?;
@@ -162,13 +162,13 @@ impl Shuffleboard {
                 | Capabilities::FREE_BODIES
                 | Capabilities::TORSIONAL_FRICTION,
             parameters: frictions(),
-            // Each sets its zone as the goal; the truth is drawn from the prior.
+            // Each condition sets its zone as the goal; the truth is drawn from the prior.
             conditions: Zone::ALL
                 .map(|zone| Condition::drawn(zone.name(), &[]))
                 .into(),
             difficulty: levels.all().to_vec(),
             tracker_rate: Some(difficulty::rate(&levels)?),
-            // A puck that the hand throws, at the least friction.
+            // The reach of a puck that the hand throws, at the lowest friction.
             bounds: [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]],
             top_view: top_view(zone_length),
             ..TaskSpec::new([NAME, ABOUT], scene, exploration, downstream)
@@ -185,7 +185,7 @@ impl Shuffleboard {
     }
 }
 
-/// Friction of the puck on the board.
+/// The unknowns: friction of the puck on the board.
 fn frictions() -> Vec<Parameter> {
     [
         (
@@ -212,7 +212,7 @@ fn frictions() -> Vec<Parameter> {
     .collect()
 }
 
-/// Puck, board and zones from above.
+/// Top view of puck, board and zones.
 fn top_view(zone_length: f64) -> TopView {
     let zone = |z: Zone| Outline {
         label: format!("{} zone", z.name()),
@@ -235,7 +235,7 @@ fn top_view(zone_length: f64) -> TopView {
     }
 }
 
-/// What makes the task easier or harder.
+/// Difficulties of the task.
 fn difficulties() -> Vec<Difficulty> {
     let zone = "length of each zone along the board";
     let wear = "largest rise of the friction in one shot, as a share";
@@ -249,7 +249,7 @@ fn difficulties() -> Vec<Difficulty> {
     all
 }
 
-/// The puck lies at x = 0.4 m in the middle of the board, give or take `slack`.
+/// Start poses: the puck lies at x = 0.4 m in the middle of the board, within `slack`.
 fn start(slack: f64) -> Vec<Coordinate> {
     vec![
         Coordinate::new("x", "m", [0.4 - slack, 0.4 + slack]),
@@ -283,7 +283,8 @@ impl Task for Shuffleboard {
         }
     }
 
-    /// Another puck: lighter by 15 %, smaller by 1 mm. The board wears in this world as in every other.
+    /// Another puck: 15 % lighter and 1 mm smaller in radius. The board wears in this world as in
+    /// every other.
     fn stand_in(&self) -> Result<Option<Scene>> {
         let size = format!("{} {PUCK_REST_HEIGHT}", PUCK_RADIUS - 0.001);
         let puck = self

@@ -1,4 +1,4 @@
-//! The task's primitive: the closed gripper goes behind the puck and strikes it once.
+//! The task's motion primitive: the closed gripper moves behind the puck and strikes it once.
 
 use asid_core::{Result, Scene};
 use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
@@ -10,33 +10,36 @@ use crate::panda;
 /// Length of a frame, s.
 pub const FRAME_PERIOD: f64 = 0.01;
 
-/// Strength of a strike: doublings of [`MIDDLE_SPEED`]. The way of the puck goes with the square of the
-/// speed over the friction, so that a step of strength counts the same at every friction and for either zone.
+/// Range of the strength of a strike: doublings of [`MIDDLE_SPEED`].
+///
+/// The puck's distance is proportional to the squared speed over the friction. A step of strength
+/// therefore has the same relative effect at every friction and for either zone.
 pub const STRENGTH: [f64; 2] = [-1.0, 1.0];
 
 /// Speed of a strike of strength 0, m/s.
 const MIDDLE_SPEED: f64 = 0.4;
 
-/// From the middle of the closed pads to their front, m.
+/// Distance from the middle of the closed finger pads to their front, m.
 const PAD_FRONT: f64 = 0.014;
 
-/// Way over which the hand reaches its speed, m. It ends before the hand meets the puck.
+/// Distance over which the hand accelerates, m. It ends before the hand meets the puck.
 const RUN_UP: f64 = 0.035;
 
-/// Way at constant speed, m; the puck is met in its middle.
+/// Distance at constant speed, m; the hand meets the puck in its middle.
 const STROKE: f64 = 0.02;
 
-/// Way over which the hand stops, m.
+/// Distance over which the hand stops, m.
 const RUN_OUT: f64 = 0.03;
 
-/// How long the hand takes to go behind the puck, s.
+/// Time that the hand takes to move behind the puck, s.
 const APPROACH: f64 = 0.4;
-/// How long it stands there, s.
+/// Time that the hand waits there, s.
 const STAND: f64 = 0.1;
-/// From the strike's begin to the end of the attempt, s: a puck on the least friction has come to rest.
+/// Time from the start of the strike to the end of the attempt, s: a puck on the lowest friction
+/// has come to rest.
 const WATCH: f64 = 5.0;
 
-/// Frames of an attempt.
+/// Number of frames of an attempt.
 pub fn frames() -> usize {
     ((APPROACH + STAND + WATCH) / FRAME_PERIOD).round() as usize
 }
@@ -51,8 +54,9 @@ pub fn phases() -> Vec<(String, f64, f64)> {
     ]
 }
 
-/// Way of the hand `t` seconds after the strike began: a steady acceleration to `speed`,
-/// a stroke, a steady stop.
+/// Distance of the hand `t` seconds after the start of the strike, m.
+///
+/// It accelerates uniformly to `speed`, moves at constant speed, and stops uniformly.
 fn way(speed: f64, t: f64) -> f64 {
     let (up, stroke, out) = (2.0 * RUN_UP / speed, STROKE / speed, 2.0 * RUN_OUT / speed);
     if t < up {
@@ -70,13 +74,15 @@ fn speed(strength: f64) -> f64 {
     MIDDLE_SPEED * strength.exp2()
 }
 
-/// Commands of an attempt, `frames x actuators`, for a puck believed to lie at `start`
-/// (x, y, yaw) and a strike of `strength`.
+/// Commands of an attempt, `frames x actuators`.
+///
+/// The puck is believed to lie at `start` (x, y, yaw); the strike has the given `strength`.
 pub fn commands(scene: &Scene, home: &[f64], start: &[f64], strength: f64) -> Result<Vec<f64>> {
     let settings = CartesianSettings::default();
     let mut controller = CartesianController::new(scene, panda::END_EFFECTOR, home, settings)?;
     let from = controller.position();
-    // The fingers stay closed: open ones would throw a puck aside that they do not meet in its middle.
+    // The fingers stay closed: open ones would throw a puck aside if they did not meet it in its
+    // middle.
     let meets = start[0] - PUCK_RADIUS - PAD_FRONT;
     let behind = Vector3::new(meets - RUN_UP - 0.5 * STROKE, start[1], from.z);
     let nu = panda::ARM_JOINTS + 2;

@@ -1,16 +1,16 @@
-//! The unknown of the tasks with one floor, and its named truths.
+//! The unknown of the tasks with a uniform floor, and its named truths.
 
 use asid_core::Target;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::task::Condition;
 
-/// Range of rolling friction, m.
+/// Prior range of the rolling friction, m.
 const RANGE: [f64; 2] = [1e-3, 5e-3];
 
-/// Truths out of range, m.
+/// Range of out-of-range truths, m.
 const OUT_OF_RANGE: [f64; 2] = [5.2e-3, 6e-3];
 
-/// Rolling friction of a geom, m.
+/// The unknown rolling friction of a geom, m.
 #[must_use]
 pub fn rolling_friction(geom: &str) -> Parameter {
     Parameter {
@@ -22,7 +22,7 @@ pub fn rolling_friction(geom: &str) -> Parameter {
     }
 }
 
-/// A truth drawn from the prior by the seed, and one beyond it.
+/// Conditions: a truth drawn from the prior by the seed, and one beyond the prior.
 #[must_use]
 pub fn conditions() -> Vec<Condition> {
     vec![

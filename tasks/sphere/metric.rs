@@ -1,4 +1,4 @@
-//! When a strike succeeds: how far from the goal the ball comes to rest.
+//! Success of a strike: the distance from the goal at which the ball comes to rest.
 
 use asid_core::task::Outcome;
 
@@ -7,7 +7,7 @@ use super::strike::FRAME_PERIOD;
 /// Entries of a row of readings: the ball's position.
 pub const WIDTH: usize = 3;
 
-/// A ball that moved by less in the last [`REST_FRAMES`] is at rest, m (10 mm/s).
+/// A ball that moved less than this in the last [`REST_FRAMES`] is at rest, m (10 mm/s).
 const REST_WAY: f64 = 0.001;
 
 /// Frames over which rest is judged: 0.1 s.
@@ -21,22 +21,24 @@ pub fn distance(row: &[f64], goal: [f64; 2]) -> f64 {
     (row[0] - goal[0]).hypot(row[1] - goal[1])
 }
 
-/// Cost of the speed of a ball that goes past the line behind the goal, s.
+/// Weight of the speed of a ball that passes the line behind the goal, s: it turns the speed into a
+/// cost in metres.
 const OVERSHOOT: f64 = 1.0;
 
-/// Where the ball is to come to rest.
+/// The goal in which the ball must come to rest.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
-    /// Its middle, m.
+    /// Position of its centre, m.
     pub at: [f64; 2],
     /// Largest distance of a success, m.
     pub radius: f64,
 }
 
-/// What came of an attempt: the distance in the last row, if the ball rests there.
+/// Outcome of an attempt: the distance in the last row; a success requires that the ball is at
+/// rest.
 ///
-/// `line` is a y behind the goal. Every ball that is too fast ends before the same wall, so the cost counts
-/// how fast it goes past that line: a search is led back to the goal.
+/// `line` is a y coordinate behind the goal. Every ball that is too fast ends at the same wall, so
+/// the cost includes the speed at which it passes that line. This leads a search back to the goal.
 pub fn outcome(readings: &[f64], goal: Goal, line: Option<f64>) -> Outcome {
     let rows = readings.len() / WIDTH;
     let row = |k: usize| &readings[k * WIDTH..][..WIDTH];
@@ -58,7 +60,8 @@ pub fn outcome(readings: &[f64], goal: Goal, line: Option<f64>) -> Outcome {
     }
 }
 
-/// Speed at which the ball goes past a y, towards lower ones, m/s; 0 where it does not get there.
+/// Speed at which the ball passes a y coordinate towards lower ones, m/s; 0 where it does not reach
+/// it.
 fn speed_at(readings: &[f64], y: f64) -> f64 {
     let mut steps = readings
         .chunks_exact(WIDTH)

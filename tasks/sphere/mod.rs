@@ -1,7 +1,7 @@
-//! What the tasks with a ball have in common: a Panda whose fingers are a paddle, a ball that
-//! rolls until the floor's rolling friction stops it, and a goal.
+//! Common code of the tasks with a ball: a Panda whose fingers are a paddle, a ball that rolls
+//! until the floor's rolling friction stops it, and a goal.
 //!
-//! A task of this family says what is its own in a [`Spec`].
+//! Each task of this family defines its own part in a [`Spec`].
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
@@ -31,10 +31,11 @@ pub use spec::{Area, Number, Setting, Spec};
 /// Radius of the ball, m.
 const BALL_RADIUS: f64 = 0.03;
 
-/// Command of each finger, m from the middle: the pads meet the ball 30 degrees left and right.
+/// Finger command, m from the middle: the pads meet the ball 30 degrees left and right.
 const FINGERS: f64 = 0.012;
 
-/// The paddle moves at the height of the ball's middle; a ball fits between it and each wall.
+/// Workspace of the paddle, at the height of the ball's middle; a ball fits between it and each
+/// wall.
 pub const STEERING: Steering = Steering {
     speed: HAND_SPEED,
     x: [0.30, 0.70],
@@ -43,13 +44,13 @@ pub const STEERING: Steering = Steering {
     fingers: FINGERS,
 };
 
-/// Speed of the hand unless the difficulty says otherwise, m/s.
+/// Speed of the hand unless the difficulty sets another, m/s.
 const HAND_SPEED: f64 = 0.4;
 
-/// Radius of the goal unless the difficulty says otherwise, m.
+/// Radius of the goal unless the difficulty sets another, m.
 const GOAL_RADIUS: f64 = 0.05;
 
-/// Time constant of the contact of ball and paddle unless the difficulty says otherwise, s.
+/// Time constant of the contact of ball and paddle unless the difficulty sets another, s.
 const CONTACT_TIME: f64 = 0.03;
 
 /// A task of the family.
@@ -62,7 +63,7 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    /// The task of a specification.
+    /// The task of a specification, at its default difficulty.
     ///
     /// # Errors
     /// When the scene cannot be read or lacks the arm or a keyframe.
@@ -70,7 +71,7 @@ impl Sphere {
         Self::at(spec, Levels::new(difficulties()))
     }
 
-    /// The task at some difficulty.
+    /// The task at the given difficulty levels.
     fn at(spec: Spec, levels: Levels) -> Result<Self> {
         let (scene, home) = panda::scene(spec.name, spec.xml)?;
         let radius = levels.get("goal_radius")?;
@@ -138,7 +139,7 @@ impl Sphere {
     }
 }
 
-/// The balls.
+/// The balls, as tracked objects.
 fn objects(spec: &Spec) -> Vec<TrackedObject> {
     balls(spec)
         .map(|ball| TrackedObject {
@@ -154,7 +155,7 @@ fn objects(spec: &Spec) -> Vec<TrackedObject> {
         .collect()
 }
 
-/// Ball, goal and what stands still from above.
+/// Top view of ball, goal and fixtures.
 fn top_view(spec: &Spec, goal: &metric::Goal) -> TopView {
     let mut fixtures = spec.fixtures.clone();
     fixtures.push(Outline {
@@ -171,7 +172,7 @@ fn top_view(spec: &Spec, goal: &metric::Goal) -> TopView {
     }
 }
 
-/// What makes the task easier or harder.
+/// Difficulties of the task.
 fn difficulties() -> Vec<Difficulty> {
     let goal = "radius of the goal";
     let contact = "time constant of the contact of ball and paddle; a smaller one is stiffer";
@@ -184,24 +185,24 @@ fn difficulties() -> Vec<Difficulty> {
     all
 }
 
-/// Bodies of all balls, the one that is struck first.
+/// Bodies of all balls; the struck one comes first.
 fn balls(spec: &Spec) -> impl Iterator<Item = &'static str> {
     std::iter::once("ball").chain(spec.distractors.iter().copied())
 }
 
-/// Sensor of a ball's position.
+/// Name of the sensor of a ball's position.
 fn position_of(ball: &str) -> String {
     format!("{ball}_pos")
 }
 
-/// Pairs of bodies that touch where the paddle touches a ball.
+/// Pairs of bodies that touch when the paddle touches a ball.
 fn paddle_on(ball: &str) -> Vec<[String; 2]> {
     ["finger_left", "finger_right"]
         .map(|finger| [finger.into(), ball.into()])
         .into()
 }
 
-/// Coordinates of a place in an area.
+/// Coordinates of a position in an area.
 fn place_in([x, y]: Area) -> Vec<Coordinate> {
     vec![Coordinate::new("x", "m", x), Coordinate::new("y", "m", y)]
 }
@@ -277,7 +278,7 @@ impl Task for Sphere {
     }
 }
 
-/// The target of a parameter that is built in.
+/// Target of a built-in parameter.
 #[must_use]
 pub fn target(target: &str) -> Vec<Target> {
     target.parse().into_iter().collect()

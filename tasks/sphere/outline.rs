@@ -1,4 +1,4 @@
-//! Shapes from above, for pictures.
+//! Top-view shapes, for pictures.
 
 use asid_core::task::Outline;
 

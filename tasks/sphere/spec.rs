@@ -1,4 +1,4 @@
-//! What a task of the family says of itself.
+//! Specification of one task of the family.
 
 use asid_core::parameter::Parameter;
 use asid_core::task::{Condition, Outline};
@@ -6,10 +6,10 @@ use asid_core::task::{Condition, Outline};
 use super::{STEERING, conditions, rolling_friction, walls};
 use crate::steering::Steering;
 
-/// A place in the plane: ranges of x and y, m.
+/// An area in the plane: ranges of x and y, m.
 pub type Area = [[f64; 2]; 2];
 
-/// What is a task's own.
+/// The part of a task that differs within the family.
 #[derive(Clone)]
 pub struct Spec {
     /// Name on the command line.
@@ -20,38 +20,40 @@ pub struct Spec {
     pub xml: &'static str,
     /// The unknowns.
     pub parameters: Vec<Parameter>,
-    /// Unknowns that can be switched on.
+    /// Optional unknowns.
     pub optional: Vec<Parameter>,
     /// Named truths.
     pub conditions: Vec<Condition>,
-    /// Where the hand may go.
+    /// Workspace and speed of the hand.
     pub steering: Steering,
-    /// Control steps of exploration.
+    /// Number of control steps of exploration.
     pub horizon: usize,
-    /// Where the ball lies when exploration begins.
+    /// Area of the ball's position at the start of exploration.
     pub explored_from: Area,
-    /// Where the ball lies when it is struck.
+    /// Area of the ball's position when it is struck.
     pub struck_from: Area,
-    /// Where it is to come to rest, m.
+    /// Position in which the ball must come to rest, m.
     pub goal: [f64; 2],
-    /// A y behind the goal past which a ball has been struck too hard, m; see the metric.
+    /// A y coordinate behind the goal; a ball that passes it was struck too hard, m. See the
+    /// metric.
     pub line: Option<f64>,
     /// Range of the paddle's speed, m/s.
     pub speed: [f64; 2],
     /// Length of an attempt, s.
     pub seconds: f64,
-    /// Things that stand still, for pictures.
+    /// Fixed objects, for pictures.
     pub fixtures: Vec<Outline>,
-    /// Parts of the floor whose visits are counted.
+    /// Regions of the floor whose visits are counted.
     pub regions: Vec<Outline>,
-    /// Further balls that are tracked, by the names of their bodies.
+    /// Names of the bodies of further tracked balls.
     pub distractors: &'static [&'static str],
-    /// Numbers of algorithms that suit the task better than their defaults.
+    /// Algorithm settings that suit the task better than their defaults.
     pub settings: &'static [Setting],
 }
 
 impl Spec {
-    /// The published task of this name and scene: one ball whose rolling friction on the floor is unknown, within walls.
+    /// The published task of this name and scene: one ball with unknown rolling friction on the
+    /// floor, within walls.
     #[must_use]
     pub fn published([name, about]: [&'static str; 2], xml: &'static str) -> Self {
         Self {
@@ -77,14 +79,15 @@ impl Spec {
     }
 }
 
-/// A number among an algorithm's settings: section (`explorer`, `identifier` or `solver`), algorithm, key, value.
+/// One numeric setting of an algorithm: section (`explorer`, `identifier` or `solver`), algorithm,
+/// key, value.
 pub type Setting = (&'static str, &'static str, &'static str, Number);
 
 /// Value of a setting.
 #[derive(Clone, Copy, Debug)]
 pub enum Number {
-    /// Of something that is counted.
+    /// An integer, for counts.
     Whole(i64),
-    /// Of something that is measured.
+    /// A real number, for measures.
     Real(f64),
 }

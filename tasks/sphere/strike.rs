@@ -1,4 +1,5 @@
-//! The tasks' primitive: go behind the ball, push it to a speed, and stop; the ball rolls on.
+//! The tasks' motion primitive: move behind the ball, push it up to a speed, and stop; the ball
+//! rolls on.
 
 use asid_core::{Result, Scene};
 use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
@@ -10,35 +11,36 @@ use crate::panda;
 /// Length of a frame, s.
 pub const FRAME_PERIOD: f64 = 0.01;
 
-/// Height of the pads' middle over the ball, m.
+/// Height of the finger pads' middle above the ball, m.
 const CLEARANCE: f64 = 0.11;
 
-/// Distance of the hand behind the ball before the stroke, m: they touch at 0.038 m.
+/// Distance of the hand behind the ball before the stroke, m; they touch at 0.038 m.
 const STANDOFF: f64 = 0.048;
 
-/// Way over which the paddle comes to speed, and over which it stops again, m.
+/// Distances over which the paddle accelerates and stops, m.
 const STROKE: [f64; 2] = [0.10, 0.05];
 
-/// Seconds to rise, to go over the place behind the ball, to go down, and to wait there.
+/// Times to rise, to move over the position behind the ball, to descend, and to wait there, s.
 const APPROACH: [f64; 4] = [0.3, 0.6, 0.35, 0.1];
 
-/// A ball to be struck.
+/// Parameters of a strike.
 #[derive(Clone, Copy, Debug)]
 pub struct Strike {
-    /// Where the ball is believed to lie, m.
+    /// Believed position of the ball, m.
     pub ball: [f64; 2],
-    /// Where it is to come to rest, m.
+    /// Position in which it must come to rest, m.
     pub goal: [f64; 2],
-    /// Distance that `speed` is meant for, m.
+    /// Distance from ball to goal for which `speed` is meant, m.
     pub distance: f64,
-    /// Speed of the paddle for a ball at that distance, m/s. From elsewhere it goes with the
-    /// root of the distance, as the way of a ball that is slowed evenly goes with its speed squared.
+    /// Speed of the paddle for a ball at that distance, m/s. For other distances it scales with the
+    /// square root of the distance, since a ball under constant deceleration rolls a distance
+    /// proportional to its speed squared.
     pub speed: f64,
-    /// Direction left of the goal, rad.
+    /// Direction of the strike, left of the goal, rad.
     pub aim: f64,
 }
 
-/// Frames of a phase.
+/// Number of frames of a phase.
 fn phase_frames(seconds: f64) -> usize {
     (seconds / FRAME_PERIOD).round() as usize
 }
@@ -59,7 +61,7 @@ pub fn phases(seconds: f64) -> Vec<(String, f64, f64)> {
     phases
 }
 
-/// Way of the paddle `t` seconds into a stroke at `speed` (m/s), m.
+/// Distance of the paddle `t` seconds into a stroke at `speed` (m/s), m.
 fn way(speed: f64, t: f64) -> f64 {
     let [up, down] = STROKE;
     let [rise, fall] = [2.0 * up / speed, 2.0 * down / speed];
@@ -106,7 +108,7 @@ pub fn commands(scene: &Scene, home: &[f64], strike: &Strike, frames: usize) -> 
     Ok(ctrl)
 }
 
-/// The polynomial from 0 to 1 of least jerk (Flash and Hogan 1985).
+/// Minimum-jerk polynomial from 0 to 1 (Flash and Hogan 1985).
 fn minimum_jerk(u: f64) -> f64 {
     u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 }

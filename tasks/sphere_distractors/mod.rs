@@ -1,7 +1,8 @@
-//! Sphere striking among distractors: one ball of unknown rolling friction and three whose friction is known.
+//! Sphere striking among distractors: one ball of unknown rolling friction, and three of known
+//! friction.
 //!
-//! An explorer that seeks what is new goes to any ball; one that seeks information about the unknown
-//! goes to the one ball that tells it.
+//! An explorer that seeks novelty goes to any ball. One that seeks information about the unknown
+//! goes to the one informative ball.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), appendix.
 

@@ -1,4 +1,5 @@
-//! Sphere striking in free space: the ball is stopped by the floor's rolling friction alone, for there are no walls.
+//! Sphere striking in free space: there are no walls, so the floor's rolling friction alone stops
+//! the ball.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), appendix.
 

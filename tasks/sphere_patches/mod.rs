@@ -1,4 +1,4 @@
-//! Sphere patches: find the rolling frictions of three patches of floor, then strike a ball from the
+//! Sphere patches: find the rolling frictions of three floor patches, then strike a ball from the
 //! first over the second so that it comes to rest in the last.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
@@ -15,11 +15,11 @@ const NAME: &str = "sphere-patches";
 /// One line for `asid list`.
 const ABOUT: &str = "find the rolling frictions of three patches, then strike a ball into the last";
 
-/// Range of each rolling friction, m. The paper's reaches down to 1e-5 m, where a ball takes 9 s to
-/// stop and one part in a thousand of its energy decides whether it stops in the goal.
+/// Prior range of each rolling friction, m. The paper's reaches down to 1e-5 m, where a ball takes
+/// 9 s to stop and one part in a thousand of its energy decides whether it stops in the goal.
 const RANGE: [f64; 2] = [2e-4, 1e-3];
 
-/// Rolling friction of every patch out of range, m.
+/// Rolling friction of every patch in the out-of-range condition, m.
 const OUT_OF_RANGE: f64 = 1.2e-3;
 
 /// The patches, first to last: ranges of x and y, m.
@@ -29,10 +29,12 @@ pub const PATCHES: [Area; 3] = [
     [[0.2, 0.8], [-0.568, -0.256]],
 ];
 
-/// An episode is three times as long as in the other tasks. The search for a plan is broad rather than
-/// deep, for few plans carry the ball into every patch: fewer segments, more plans, each tried at one
-/// value of the unknowns. So is that for a strike: slow balls stop at a seam of two patches, whatever
-/// their speed, and a search that begins with few strikes can settle there.
+/// Settings for an episode three times as long as in the other tasks.
+///
+/// The planner's search is broad and not deep, since few plans carry the ball into every patch:
+/// fewer segments and more plans, each tried at one value of the unknowns. The search for a strike
+/// is broad too. Slow balls stop at a seam between two patches whatever their speed, and a search
+/// that begins with few strikes can settle there.
 const SETTINGS: [Setting; 7] = [
     ("explorer", "fisher-cem", "hold", Whole(15)),
     ("explorer", "fisher-cem", "iterations", Whole(3)),
@@ -49,7 +51,7 @@ asid_core::register!(TaskEntry {
     make: || Ok(Box::new(Sphere::new(spec())?)),
 });
 
-/// Name of a patch's unknown.
+/// Name of the unknown of a patch.
 fn unknown(patch: usize) -> String {
     format!("rolling_friction_{patch}")
 }
@@ -80,7 +82,7 @@ fn spec() -> Spec {
             },
         ],
         steering: Steering {
-            y: [-0.46, 0.29], // from where the hand begins
+            y: [-0.46, 0.29], // start position of the hand
             ..STEERING
         },
         horizon: 60,

@@ -1,9 +1,9 @@
-//! Sphere striking: find a floor's rolling friction by pushing a ball about, then strike the ball
-//! so that it comes to rest in a goal.
+//! Sphere striking: find a floor's rolling friction by pushing a ball, then strike the ball so that
+//! it comes to rest in a goal.
 //!
-//! A ball of 0.03 m and 0.02 kg lies in an arena with four walls. On a floor of rolling friction
-//! `mu` (m) a rolling ball is slowed by `5/7 mu g / r`, so that a strike right for 1e-3 m stops a
-//! fifth as far at 5e-3 m.
+//! A ball of 0.03 m radius and 0.02 kg lies in an arena with four walls. On a floor of rolling
+//! friction `mu` (m) it decelerates by `5/7 mu g / r`. A strike that is right for 1e-3 m therefore
+//! stops at a fifth of the distance at 5e-3 m.
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
@@ -33,7 +33,7 @@ fn spec() -> Spec {
                 scale: Scale::Linear,
                 unit: String::new(),
             },
-            // Time constant of the contact of ball and paddle: the smaller, the stiffer.
+            // Time constant of the contact of ball and paddle; a smaller one is stiffer.
             Parameter {
                 name: "stiffness".into(),
                 targets: target("geom/ball/solref/0"),

@@ -1,8 +1,8 @@
-//! Looks at a world between its frames.
+//! Observes a world between its frames.
 //!
-//! A copy of the world plays the same commands and is read after every physics step, so that looking leaves
-//! the world as it is, to the bit. It shows what a frame does not: a touch that is shorter, and
-//! the state that a late tracker reports.
+//! A copy of the world plays the same commands and is read after every physics step, so that the
+//! world itself stays bit-identical. The copy shows what frames miss: short contacts, and the
+//! states that a late tracker reports.
 
 use asid_core::error::Result;
 use asid_core::layout::Recording;
@@ -11,7 +11,7 @@ use asid_core::simulator::{Control, Rollout, Simulator};
 /// Readings of the copy after each physics step.
 pub(super) struct CloseLook {
     recording: Recording,
-    /// The simulation that is the copy.
+    /// Index of the simulation that is the copy.
     copy: [usize; 1],
     frames: usize,
     substeps: usize,
@@ -20,7 +20,7 @@ pub(super) struct CloseLook {
 }
 
 impl CloseLook {
-    /// Readings of these channels over so many frames of so many physics steps.
+    /// Prepares readings of these channels over `frames` frames of `substeps` physics steps each.
     pub(super) fn new(recording: Recording, copy: usize, frames: usize, substeps: usize) -> Self {
         Self {
             rows: vec![0.0; frames * substeps * recording.width()],
@@ -32,7 +32,7 @@ impl CloseLook {
         }
     }
 
-    /// Lets the copy go from the state of `world` on with the commands of the frames.
+    /// Plays the frames' commands in the copy, from the state of `world` on.
     pub(super) fn play(
         &mut self,
         simulator: &mut dyn Simulator,
@@ -53,7 +53,7 @@ impl CloseLook {
         simulator.rollout(&rollout, &mut self.rows)
     }
 
-    /// Rows of readings, one a physics step.
+    /// Rows of readings, one per physics step.
     pub(super) fn rows(&self) -> std::slice::ChunksExact<'_, f64> {
         self.rows.chunks_exact(self.recording.width().max(1))
     }

@@ -1,22 +1,23 @@
-//! Pairs of bodies whose contact is looked for: those that count as interaction, and those of each
+//! Pairs of bodies whose contacts are monitored: those that count as interaction, and those of each
 //! of the task's objects.
 
 use asid_core::task::Task;
 
-/// Notes where there is a force.
+/// Marks the channels that have a force.
 pub(super) fn note(forces: &[f64], touched: &mut [bool]) {
     for (touched, force) in touched.iter_mut().zip(forces) {
         *touched |= *force > 0.0;
     }
 }
 
-/// Pairs of bodies whose contact is looked for, and which of them count for what.
+/// Pairs of bodies whose contacts are monitored, and what each counts for.
 pub(super) struct Pairs {
-    /// Channels of contact force, each once.
+    /// Channels of contact force, without duplicates.
     pub(super) channels: Vec<String>,
-    /// Channels that count as interaction, then those of each of the task's objects.
+    /// Indices of the channels that count as interaction, then of those of each of the task's
+    /// objects.
     counted: Vec<Vec<usize>>,
-    /// Control steps in which one of them had a force.
+    /// For each of these groups, the control steps in which one of its channels had a force.
     steps: Vec<usize>,
 }
 
@@ -43,14 +44,14 @@ impl Pairs {
         }
     }
 
-    /// Counts a control step with these forces seen, a flag a channel.
+    /// Counts a control step, with one flag per channel for a force.
     pub(super) fn count(&mut self, touched: &[bool]) {
         for (steps, pairs) in self.steps.iter_mut().zip(&self.counted) {
             *steps += usize::from(pairs.iter().any(|&i| touched[i]));
         }
     }
 
-    /// Shares of `horizon` control steps: of interaction, and of each object's.
+    /// Shares of `horizon` control steps with contact: of interaction, and of each object.
     pub(super) fn shares(&self, horizon: usize) -> (f64, Vec<f64>) {
         let mut shares = self.steps.iter().map(|&n| n as f64 / horizon as f64);
         (shares.next().unwrap_or_default(), shares.collect())

@@ -1,7 +1,7 @@
-//! What a tracker says of a world: with noise, and with errors that do not average out.
+//! Readings of a tracker: with noise, and with errors that do not average out.
 //!
-//! Noise is what a method is told of. That a tracker is late, is off or misses readings it is not told. Both act on
-//! what a world says and never on what happens in it.
+//! A method is told of the noise. It is not told of latency, offsets or missing readings. Both
+//! kinds of errors affect the readings and never the world itself.
 
 use asid_core::error::{Error, Result};
 use asid_core::layout::Layout;
@@ -10,20 +10,21 @@ use asid_core::tracker::ReadingFrames;
 use asid_readings::SignalSet;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Systematic errors of the tracker of a [`SimulatedWorld`](super::SimulatedWorld); without any by default.
+/// Systematic errors of the tracker of a [`SimulatedWorld`](super::SimulatedWorld); none by
+/// default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrackerErrors {
-    /// Age of what a reading shows, s; to the nearest physics step. Before the start of an
-    /// episode the world stood as at its start.
+    /// Age of a reading, s, to the nearest physics step. Before the start of an episode the state
+    /// counts as that at its start.
     pub latency: f64,
-    /// Constant error of each tracked signal, one after the other as in a whitened difference
-    /// ([`SignalSet::whitened_len`] numbers): added to numbers and vectors in their unit, and a rotation
-    /// vector (rad) about the axes of the object for an orientation. Empty for none.
+    /// Constant error of each tracked signal, in the order of a whitened difference
+    /// ([`SignalSet::whitened_len`] numbers). It is added to numbers and vectors in their unit; for
+    /// an orientation it is a rotation vector (rad) about the axes of the object. Empty for none.
     pub offset: Vec<f64>,
-    /// Frames from one reading to the next, the first frame read; 1 for every frame.
+    /// Frames from one reading to the next; the first frame is read. 1 for every frame.
     pub every: usize,
-    /// Probability that a reading is lost, of all signals together, as where the view is blocked.
-    /// The first one of an episode never is.
+    /// Probability that a reading is lost, for all signals together, as where the view is blocked.
+    /// The first reading of an episode is never lost.
     pub dropout: f64,
 }
 
@@ -39,10 +40,10 @@ impl Default for TrackerErrors {
 }
 
 impl TrackerErrors {
-    /// Checks the numbers against the signals that are tracked.
+    /// Checks the numbers against the tracked signals.
     ///
     /// # Errors
-    /// [`Error::Config`] where one makes no sense.
+    /// [`Error::Config`] where one is out of its domain.
     pub fn check(&self, signals: &SignalSet) -> Result<()> {
         let wrong = |key: &str, message: String| Error::Config {
             key: format!("real.perturbation.tracker_{key}"),
@@ -67,15 +68,16 @@ impl TrackerErrors {
         Ok(())
     }
 
-    /// Shifts a true reading by the constant error.
+    /// Adds the constant error to a true reading.
     pub(super) fn shift(&self, signals: &SignalSet, reading: &mut [f64]) {
         if !self.offset.is_empty() {
             signals.add_offset(reading, &self.offset);
         }
     }
 
-    /// Whether the reading of a frame is there; `chance` is drawn from at each frame, so that the rate
-    /// does not change what is lost.
+    /// Whether the frame has a reading.
+    ///
+    /// Every frame draws from `chance`, so that the rate does not change which readings are lost.
     pub(super) fn reads(&self, frame: usize, chance: &mut Rng) -> bool {
         use rand::Rng as _;
         let lost = chance.random::<f64>() < self.dropout;
@@ -83,17 +85,17 @@ impl TrackerErrors {
     }
 }
 
-/// What the tracker says, frame by frame.
+/// The tracker's readings, frame by frame.
 pub(super) struct Tracker<'a> {
     signals: &'a SignalSet,
     errors: &'a TrackerErrors,
     rate: ReadingFrames,
-    /// Physics steps by which it is late.
+    /// Latency in physics steps.
     pub(super) late: usize,
-    /// Physics steps of a frame.
+    /// Physics steps per frame.
     substeps: usize,
-    /// True readings of the signals after each physics step, the start first; all that a late
-    /// tracker may still report.
+    /// True readings of the signals after each physics step, from the start on; a late tracker
+    /// reports from these.
     past: Vec<f64>,
     frame: usize,
     noise: Rng,
@@ -121,20 +123,20 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Takes the start of an episode, a row that begins with the tracked signals.
+    /// Receives the start of an episode: a row that begins with the tracked signals.
     pub(super) fn begin(&mut self, start: &[f64]) {
         self.past.extend_from_slice(&start[..self.signals.width()]);
     }
 
-    /// Takes what was true after each physics step, rows that begin with the tracked signals.
+    /// Receives the true states after each physics step: rows that begin with the tracked signals.
     pub(super) fn look<'r>(&mut self, rows: impl Iterator<Item = &'r [f64]>) {
         for row in rows {
             self.past.extend_from_slice(&row[..self.signals.width()]);
         }
     }
 
-    /// Turns the next frame's true reading, which begins with the tracked signals, into what
-    /// is read. Returns whether the tracker read anything.
+    /// Converts the next frame's true reading, which begins with the tracked signals, to the
+    /// tracker's reading. Returns whether the tracker read anything.
     pub(super) fn read(&mut self, row: &mut [f64]) -> bool {
         let tracked = self.signals.width();
         let seen = &mut row[..tracked];
