@@ -1,4 +1,4 @@
-//! A cell: one run of one method, and what came of it.
+//! A cell: one run of one method, and its outcome.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,9 +22,9 @@ pub struct CellKey {
 }
 
 impl CellKey {
-    /// Name of the cell's files, without their ending: the key's parts, joined by dots.
+    /// Name of the cell's files without extension: the parts of the key, joined by dots.
     ///
-    /// Whatever is no letter, digit, `-` or `_` in a part is written as `%XX`, so that
+    /// Any character of a part other than a letter, digit, `-` or `_` is written as `%XX`, so that
     /// different keys have different names.
     #[must_use]
     pub fn stem(&self) -> String {
@@ -40,7 +40,7 @@ impl CellKey {
         parts.map(|p| escaped(p)).join(".")
     }
 
-    /// `rod-balancing, left, asid, matched, rapier, seed 0`.
+    /// The key in words: `rod-balancing, left, asid, matched, rapier, seed 0`.
     #[must_use]
     pub fn words(&self) -> String {
         format!(
@@ -49,14 +49,14 @@ impl CellKey {
         )
     }
 
-    /// True where both are cells of one row.
+    /// Whether both are cells of one row.
     #[must_use]
     pub fn row_mate(&self, other: &Self) -> bool {
         self.condition == other.condition && self.arm_mate(other)
     }
 
-    /// True where both are of one method on one task in one world on one engine: what shares
-    /// its settings.
+    /// Whether both are of one method on one task in one world on one engine; such cells share
+    /// their settings.
     #[must_use]
     pub fn arm_mate(&self, other: &Self) -> bool {
         (&self.task, &self.method, &self.world, &self.backend)
@@ -64,7 +64,7 @@ impl CellKey {
     }
 }
 
-/// A part of a file's name.
+/// A key's part as it appears in a file name.
 fn escaped(text: &str) -> String {
     text.bytes()
         .map(|b| match b {
@@ -74,25 +74,25 @@ fn escaped(text: &str) -> String {
         .collect()
 }
 
-/// What made a cell.
+/// Versions of what produced a cell.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Versions {
     /// Version of this program.
     pub asid: String,
     /// Engine and its version.
     pub engine: String,
-    /// Commit; empty where it is not known.
+    /// Commit; empty where it is unknown.
     pub git: String,
 }
 
-/// What a run found of one unknown.
+/// Identification result of one unknown in a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellParameter {
     /// Name.
     pub name: String,
     /// Unit.
     pub unit: String,
-    /// The real world's value.
+    /// True value in the real world.
     #[serde(with = "number::scalar")]
     pub truth: f64,
     /// Estimate.
@@ -104,17 +104,17 @@ pub struct CellParameter {
     /// Central 95 % interval of the posterior.
     #[serde(with = "number::pair")]
     pub interval95: [f64; 2],
-    /// Expected posterior standard deviation after the episode; none without one.
+    /// Expected posterior standard deviation after the episode; `None` without exploration.
     #[serde(with = "number::option")]
     pub expected_std: Option<f64>,
 }
 
-/// One run and its outcome. It holds no times: those have files of their own.
+/// One run and its outcome. Times are not part of it: they have files of their own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Layout version.
     pub schema: u32,
-    /// Which one it is.
+    /// Key of the cell.
     #[serde(flatten)]
     pub key: CellKey,
     /// Explorer, or `none`.
@@ -125,14 +125,14 @@ pub struct Cell {
     pub solver: String,
     /// Hash of the resolved settings: [`crate::settings::hash`].
     pub settings: String,
-    /// What made it.
+    /// Versions of what produced it.
     pub versions: Versions,
     /// The unknowns.
     pub parameters: Vec<CellParameter>,
-    /// Residual of the identification; none without one.
+    /// Residual of the identification; `None` without identification.
     #[serde(with = "number::option")]
     pub residual: Option<f64>,
-    /// Share of the exploration's control steps with contact; none without exploration.
+    /// Share of the exploration's control steps with contact; `None` without exploration.
     #[serde(with = "number::option")]
     pub contact_fraction: Option<f64>,
     /// Name of the task's metric; lower is better.

@@ -1,5 +1,5 @@
-//! `config.toml` of a comparison: its plan under `[compare]`, and beside it the settings that
-//! every run is given, as a run's own `config.toml` has them.
+//! `config.toml` of a comparison: its plan under `[compare]`, and beside it the settings of every
+//! run in the format of a run's own `config.toml`.
 
 use std::path::Path;
 
@@ -8,23 +8,23 @@ use asid_documents::toml_text;
 
 use crate::plan::Plan;
 
-/// Name of the plan's section.
+/// Name of the section that holds the plan.
 pub const SECTION: &str = "compare";
 
-/// What is compared, with the settings that were given.
+/// The plan of a comparison, with its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Document {
-    /// What is run.
+    /// The plan.
     pub plan: Plan,
-    /// Settings of every run; those of an algorithm count for the methods that use it.
+    /// Settings of every run; those of an algorithm apply to the methods that use it.
     pub settings: toml::Table,
 }
 
 impl Document {
-    /// As text.
+    /// Returns the document as TOML text.
     ///
     /// # Errors
-    /// When the plan is no TOML, which a seed beyond 63 bits is not.
+    /// When the plan cannot be written as TOML, for example because of a seed beyond 63 bits.
     pub fn text(&self) -> Result<String> {
         let wrong = |e: toml::ser::Error| Error::Config {
             key: SECTION.into(),
@@ -36,10 +36,10 @@ impl Document {
         toml::to_string_pretty(&all).map_err(wrong)
     }
 
-    /// Takes the plan out of a configuration; none where it has no `[compare]`.
+    /// Takes the plan out of a configuration; `None` where it has no `[compare]`.
     ///
     /// # Errors
-    /// When the section is no plan.
+    /// When the section is no valid plan.
     pub fn plan_of(table: &mut toml::Table) -> Result<Option<Plan>> {
         let Some(section) = table.remove(SECTION) else {
             return Ok(None);
@@ -53,10 +53,10 @@ impl Document {
             })
     }
 
-    /// Reads a comparison's file.
+    /// Reads a comparison's `config.toml`.
     ///
     /// # Errors
-    /// When it cannot be read or is that of something else.
+    /// When it cannot be read or belongs to something else.
     pub fn read(path: &Path) -> Result<Self> {
         let wrong = |message: String| Error::File {
             path: path.to_owned(),

@@ -1,11 +1,11 @@
-//! Tables as they are meant, before they are set as Markdown or HTML.
+//! Tables in an abstract form, before they are formatted as Markdown or HTML.
 
 /// A cell of a table.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Entry {
     /// Text.
     pub text: String,
-    /// Whether it is the best of its column, apart from the next.
+    /// Whether it is the best of its column, with an interval apart from the next one's.
     pub best: bool,
 }
 
@@ -18,12 +18,12 @@ impl<T: Into<String>> From<T> for Entry {
     }
 }
 
-/// A column's head.
+/// Head of a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Head {
     /// Title.
     pub title: String,
-    /// Whether it holds numbers.
+    /// Whether the column holds numbers.
     pub number: bool,
 }
 
@@ -32,16 +32,16 @@ pub struct Head {
 pub struct Grid {
     /// Title.
     pub title: String,
-    /// What its columns mean, in a sentence or two.
+    /// Explanation of its columns, in a sentence or two.
     pub caption: String,
-    /// Heads.
+    /// Heads of the columns.
     pub head: Vec<Head>,
-    /// Rows as long as the head.
+    /// Rows, each as long as the head.
     pub rows: Vec<Vec<Entry>>,
 }
 
 impl Grid {
-    /// A table without rows.
+    /// Creates a table without rows and columns.
     #[must_use]
     pub fn new(title: &str, caption: &str) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl Grid {
         self
     }
 
-    /// Takes out columns that are empty in every row.
+    /// Removes columns that are empty in every row.
     pub fn without_empty_columns(&mut self) {
         for i in (0..self.head.len()).rev() {
             if self.rows.iter().all(|r| r[i].text.is_empty()) {
@@ -83,7 +83,7 @@ impl Grid {
         }
     }
 
-    /// As Markdown: title, table, caption.
+    /// Formats the table as Markdown: title, table, caption.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mark = |e: &Entry| {

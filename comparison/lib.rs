@@ -1,14 +1,14 @@
-//! Comparisons of methods, without an engine: what is run, where it is kept, what is said of it.
+//! Comparisons of methods, independent of any engine: plan, storage and evaluation.
 //!
 //! The unit is the [cell](cell::Cell): one run of one method, in one world, under one condition of
-//! one task, on one engine, with one seed. A [plan](plan::Plan) lists cells in a fixed order, a
-//! [store](store::Store) keeps each as a file of its own, a [schedule] spreads those that are
-//! missing over threads. Whatever is written about a comparison is made from the files of its cells
-//! and from the plan, and from nothing else: no clock, no order of finishing, no machine. That is
-//! why an interrupted comparison, a [shard]ed one and an undisturbed one give the same bytes.
+//! one task, on one engine, with one seed. A [plan](plan::Plan) lists cells in a fixed order. A
+//! [store](store::Store) keeps each as a separate file. A [schedule] distributes the missing ones
+//! over threads. All output of a comparison depends only on the plan and the files of its cells,
+//! and not on clocks, the order of completion, or the machine. An interrupted comparison, a
+//! [shard]ed one and an undisturbed one therefore give the same bytes.
 //!
-//! [`rows`] are the statistics of its cells ([`asid_statistics`]), [`table`] sets them as Markdown, and
-//! [`paper`] holds the published values that stand beside them.
+//! [`rows`] are the statistics of its cells ([`asid_statistics`]), [`table`] formats them as
+//! Markdown, and [`paper`] holds the published values for comparison.
 
 pub mod cell;
 pub mod document;

@@ -1,4 +1,4 @@
-//! Comparisons put together: shares of one, or several that belong to each other.
+//! Merges comparisons: the shares of one, or several that belong together.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::document::Document;
 use crate::settings::first_difference;
 use crate::store::{CellTime, Kind, Store};
 
-/// A comparison's folder as it was read.
+/// A comparison read from its folder.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Its folder.
@@ -21,10 +21,10 @@ pub struct Part {
 }
 
 impl Part {
-    /// Reads a folder.
+    /// Reads a comparison's folder.
     ///
     /// # Errors
-    /// When it is not that of a comparison.
+    /// When it is no folder of a comparison.
     pub fn read(folder: &Path) -> Result<Self> {
         let store = Store::new(folder);
         Ok(Self {
@@ -37,35 +37,35 @@ impl Part {
     }
 }
 
-/// What several comparisons are together.
+/// Several comparisons merged into one.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// The smallest plan that holds all of them, and their settings.
+    /// The smallest plan that contains all of them, and their settings.
     pub document: Document,
-    /// Their cells, each once.
+    /// Their cells, each one once.
     pub cells: Vec<Cell>,
-    /// Why cells are not there that no part has.
+    /// Failures of cells that no part has.
     pub failures: Vec<Failure>,
-    /// Seconds that cells took.
+    /// Run times of cells, s.
     pub times: Vec<CellTime>,
-    /// Where settings are that cells name by their hash.
+    /// Stores that hold the settings to which cells refer by hash.
     pub stores: Vec<Store>,
 }
 
 /// Whether rows of different commits may stand in one table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Commits {
-    /// All cells are of one commit.
+    /// All cells must be of one commit.
     One,
-    /// Those of a row are; rows that differ say so.
+    /// The cells of a row must be of one commit; rows that differ say so.
     OneARow,
 }
 
-/// Puts comparisons together.
+/// Merges comparisons.
 ///
 /// # Errors
-/// Where they do not belong together: made by different commits or engines, with different
-/// settings, with one method's name for two methods, or with one cell that came out in two ways.
+/// Where they do not belong together: different commits or engines, different settings, one name
+/// for two methods, or two outcomes of one cell.
 pub fn unite(parts: &[Part], commits: Commits) -> Result<Merged> {
     let Some(first) = parts.first() else {
         return Err(Error::Config {
@@ -123,7 +123,9 @@ pub fn unite(parts: &[Part], commits: Commits) -> Result<Merged> {
     })
 }
 
-/// Checks that a cell fits to those that are there, and finds itself among them, with the folder that has it.
+/// Checks that a cell is consistent with those that are there.
+///
+/// Returns the same cell among them, with the part that has it, or `None` where the cell is new.
 fn add<'c>(
     there: &'c [(Cell, &'c Part)],
     cell: &Cell,
@@ -186,7 +188,7 @@ mod tests {
     use crate::cell::tests::{cell, key};
     use crate::plan::tests::plan;
 
-    /// A folder with cells of these seeds, changed by `change`.
+    /// A folder with cells of these seeds, each modified by `change`.
     fn part(folder: &Path, seeds: &[u64], change: impl Fn(&mut Cell)) -> Part {
         let store = Store::new(folder);
         let mut document = Document {
@@ -197,7 +199,7 @@ mod tests {
         crate::store::write(&store.config(), &document.text().unwrap()).unwrap();
         for &seed in seeds {
             let mut made = cell(key("a", "x", "asid", seed), seed as f64, true);
-            // Equal to itself, which NaN is not.
+            // Without parameters the cell equals itself; they may hold NaN.
             made.parameters.clear();
             change(&mut made);
             store.keep(&made, None).unwrap();
@@ -228,7 +230,7 @@ mod tests {
         let b = part(&at("b"), &[5], other);
         let merged = unite(&[a.clone(), b], Commits::OneARow).unwrap();
         assert_eq!(merged.cells.len(), 2);
-        // But not within a row.
+        // But not within one row.
         let b = part(&at("c"), &[6], |c| c.versions.git = "d".into());
         let said = unite(&[a, b], Commits::OneARow).unwrap_err().to_string();
         assert!(said.contains("commit d"), "{said}");

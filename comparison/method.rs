@@ -1,15 +1,15 @@
-//! Methods: explorer, identifier and solver under a name.
+//! Methods: an explorer, an identifier and a solver under one name.
 
 use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// Stands for an explorer or an identifier that a method goes without.
+/// Name of the explorer or identifier of a method that has none.
 pub const NONE: &str = "none";
 
-/// Stands for the identifier of the oracle, which is told the truth.
+/// Name of the identifier of the oracle, which knows the truth.
 pub const TRUTH: &str = "truth";
 
-/// A method. Its name is that of its rows.
+/// A method; its rows have its name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Method {
@@ -23,7 +23,7 @@ pub struct Method {
     pub solver: String,
 }
 
-/// Methods that have a name: the paper's, and the oracle, which shows what a task allows.
+/// Predefined methods: the paper's, and the oracle, which shows what a task allows.
 pub const NAMED: [(&str, [&str; 3]); 7] = [
     ("asid", ["fisher-cem", "reps", "cem"]),
     ("asid-estimator", ["fisher-ppo", "estimator", "cem"]),
@@ -34,17 +34,17 @@ pub const NAMED: [(&str, [&str; 3]); 7] = [
     (ORACLE, [NONE, TRUTH, "cem"]),
 ];
 
-/// The method whose solver is told the truth.
+/// The method whose solver knows the truth.
 pub const ORACLE: &str = "oracle";
 
 /// Methods of a comparison that names none: those that need no network.
 pub const BY_DEFAULT: [&str; 3] = ["asid", "random", "dr"];
 
 impl Method {
-    /// The named method.
+    /// The predefined method of this name.
     ///
     /// # Errors
-    /// When there is none of this name.
+    /// When there is no method of this name.
     pub fn named(name: &str) -> Result<Self> {
         let found = NAMED.iter().find(|(n, _)| *n == name);
         let Some((name, [explorer, identifier, solver])) = found else {
@@ -62,10 +62,10 @@ impl Method {
         })
     }
 
-    /// A name of [`NAMED`], or `NAME=explorer+identifier+solver`.
+    /// Parses a name of [`NAMED`], or `NAME=explorer+identifier+solver`.
     ///
     /// # Errors
-    /// When it is neither, takes a named method's name for something else, or makes no method.
+    /// When it is neither, uses a predefined name for other parts, or gives no valid method.
     pub fn parse(text: &str) -> Result<Self> {
         let Some((name, parts)) = text.split_once('=') else {
             return Self::named(text);
@@ -119,25 +119,25 @@ impl Method {
         }
     }
 
-    /// Whether it plays an episode in the real world before the task.
+    /// Whether it plays an exploration episode in the real world before the task.
     #[must_use]
     pub fn explores(&self) -> bool {
         self.explorer != NONE
     }
 
-    /// Whether it identifies.
+    /// Whether it identifies the unknowns.
     #[must_use]
     pub fn identifies(&self) -> bool {
         self.identifier != NONE && !self.knows_the_truth()
     }
 
-    /// Whether it is told the truth.
+    /// Whether it knows the truth.
     #[must_use]
     pub fn knows_the_truth(&self) -> bool {
         self.identifier == TRUTH
     }
 
-    /// `explorer+identifier+solver`.
+    /// The parts as `explorer+identifier+solver`.
     #[must_use]
     pub fn parts(&self) -> String {
         format!("{}+{}+{}", self.explorer, self.identifier, self.solver)
@@ -145,7 +145,7 @@ impl Method {
 }
 
 impl From<Method> for String {
-    /// As [`Method::parse`] reads it.
+    /// Writes the form that [`Method::parse`] reads.
     fn from(method: Method) -> Self {
         match Method::named(&method.name) {
             Ok(_) => method.name,

@@ -1,9 +1,9 @@
-//! Numbers in JSON that may not be finite, which JSON has no words for: `null` is none, and texts
-//! stand for the infinities.
+//! Numbers in JSON that may not be finite: `null` for NaN, and texts for the infinities, since JSON
+//! cannot represent them.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A number that survives JSON whatever it is.
+/// A number that survives a JSON round trip, whatever its value.
 #[derive(Clone, Copy)]
 struct Number(f64);
 
@@ -40,12 +40,12 @@ impl<'de> Deserialize<'de> for Number {
 pub mod scalar {
     use super::*;
 
-    /// Writes it.
+    /// Writes the number.
     pub fn serialize<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> {
         Number(*x).serialize(serializer)
     }
 
-    /// Reads it.
+    /// Reads the number.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         Number::deserialize(deserializer).map(|n| n.0)
     }
@@ -55,27 +55,27 @@ pub mod scalar {
 pub mod pair {
     use super::*;
 
-    /// Writes them.
+    /// Writes the numbers.
     pub fn serialize<S: Serializer>(x: &[f64; 2], serializer: S) -> Result<S::Ok, S::Error> {
         x.map(Number).serialize(serializer)
     }
 
-    /// Reads them.
+    /// Reads the numbers.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f64; 2], D::Error> {
         <[Number; 2]>::deserialize(deserializer).map(|p| p.map(|n| n.0))
     }
 }
 
-/// A number that may be left out.
+/// An optional number.
 pub mod option {
     use super::*;
 
-    /// Writes it.
+    /// Writes the number.
     pub fn serialize<S: Serializer>(x: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
         x.map(Number).serialize(serializer)
     }
 
-    /// Reads it; `null` is none.
+    /// Reads the number; `null` is `None`.
     pub fn deserialize<'de, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<Option<f64>, D::Error> {

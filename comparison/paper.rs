@@ -1,14 +1,15 @@
-//! The paper's values (Memmel et al., ICLR 2024), to stand beside those measured here.
+//! The paper's values (Memmel et al., ICLR 2024), for comparison with those measured here.
 //!
-//! Table 1 (simulation): rod balancing by inertia in degrees of tilt, and "sphere striking" by
-//! success, whose friction of 1.1 to 1.5 lies outside the training range of -1 to 1. Its caption
-//! says striking and the text points to the scene with patches, so the sphere's values stand beside
-//! both tasks, out of range. Tables 2 and 3 (a real Panda): rod balancing and shuffleboard,
-//! successes of three and of five attempts; they stand beside the world [`STAND_IN`].
+//! Table 1 (simulation) has rod balancing, by inertia in degrees of tilt, and "sphere striking", by
+//! success. The sphere's friction of 1.1 to 1.5 lies outside the training range of -1 to 1. The
+//! caption says striking and the text points to the scene with patches, so the sphere's values are
+//! shown for both tasks, out of range. Tables 2 and 3 (a real Panda) have rod balancing and
+//! shuffleboard, as successes of three and of five attempts. They are shown for the world
+//! [`STAND_IN`].
 
 use serde::Serialize;
 
-/// The simulated world that stands in for the paper's real one.
+/// Name of the simulated world that replaces the paper's real one.
 pub const STAND_IN: &str = "stand-in";
 
 /// What a published value measures.
@@ -39,7 +40,7 @@ pub struct Published {
 /// Methods of Table 1, in its order.
 const METHODS: [&str; 5] = ["random", "maxmi", "dr", "asid-estimator", "asid"];
 
-/// Tilt in degrees and its ±, by method, for each inertia.
+/// Tilt in degrees and its ±, per method, for each inertia.
 const ROD: [(&str, [(f64, f64); 5]); 3] = [
     (
         "left",
@@ -73,7 +74,7 @@ const ROD: [(&str, [(f64, f64); 5]); 3] = [
     ),
 ];
 
-/// Successes in per cent and their ±, by method.
+/// Successes in per cent and their ±, per method.
 const SPHERE: [(f64, f64); 5] = [
     (10.62, 4.3),
     (9.50, 2.4),
@@ -82,10 +83,10 @@ const SPHERE: [(f64, f64); 5] = [
     (28.00, 9.7),
 ];
 
-/// Tasks that Table 1's sphere may mean.
+/// Tasks to which the sphere of Table 1 may refer.
 const SPHERES: [&str; 2] = ["sphere-striking", "sphere-patches"];
 
-/// Successes of domain randomisation and of ASID, and attempts: table, task, condition.
+/// Successes of domain randomisation and of ASID, and attempts, with table, task and condition.
 const REAL: [(u8, &str, &str, [u32; 2], u32); 5] = [
     (2, "rod-balancing", "left", [0, 2], 3),
     (2, "rod-balancing", "middle", [0, 1], 3),
@@ -94,7 +95,7 @@ const REAL: [(u8, &str, &str, [u32; 2], u32); 5] = [
     (3, "shuffleboard", "far", [1, 3], 5),
 ];
 
-/// The paper's value for a row; none where it has none.
+/// The paper's value for a row; `None` where it has none.
 #[must_use]
 pub fn published(task: &str, condition: &str, method: &str, world: &str) -> Option<Published> {
     if world == STAND_IN {
@@ -127,7 +128,7 @@ pub fn published(task: &str, condition: &str, method: &str, world: &str) -> Opti
     })
 }
 
-/// What a table of the paper reports of a task.
+/// The measure that a table of the paper reports for a task.
 #[must_use]
 pub fn measure(table: u8, task: &str) -> Measure {
     if table == 1 && task == "rod-balancing" {
@@ -138,7 +139,7 @@ pub fn measure(table: u8, task: &str) -> Measure {
 }
 
 impl Published {
-    /// As the paper sets it: `12.44 ± 19.6`, `28.0 ± 9.7 %`, `2/3`.
+    /// The value in the paper's format: `12.44 ± 19.6`, `28.0 ± 9.7 %`, `2/3`.
     #[must_use]
     pub fn words(&self) -> String {
         match (self.measure, self.attempts, self.std) {
@@ -183,7 +184,7 @@ mod tests {
         assert_eq!(words("rod-balancing", "left", "oracle", "matched"), None);
     }
 
-    /// The paper's sums: 6 of 9 against 0 of 9, 7 of 10 against 3 of 10.
+    /// The sums in the paper's text: 6 of 9 against 0 of 9, 7 of 10 against 3 of 10.
     #[test]
     fn the_real_tables_sum_to_what_the_text_says() {
         for (table, dr, asid) in [(2, 0, 6), (3, 3, 7)] {

@@ -1,4 +1,4 @@
-//! What a comparison runs: tasks x conditions x engines x worlds x methods x seeds.
+//! The runs of a comparison: tasks x conditions x engines x worlds x methods x seeds.
 
 use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::cell::CellKey;
 use crate::method::Method;
 
-/// A task and the conditions that it is run under.
+/// A task and the conditions under which it is run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskPlan {
@@ -16,17 +16,17 @@ pub struct TaskPlan {
     pub conditions: Vec<String>,
 }
 
-/// Everything that is run, as `[compare]` in `config.toml` has it.
+/// The whole plan, as `[compare]` in `config.toml` holds it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    /// The paper's table that is made; none for a comparison of one's own.
+    /// Number of the paper's table that is reproduced; `None` for a custom comparison.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub table: Option<u8>,
-    /// Whether searches are cut short: [`crate::preset`].
+    /// Whether searches are shortened; see [`crate::preset`].
     #[serde(default)]
     pub quick: bool,
-    /// Whether what learns is trained here, rather than loaded as it ships.
+    /// Whether learned parts are trained here and not loaded as shipped.
     #[serde(default)]
     pub train: bool,
     /// Methods.
@@ -37,7 +37,7 @@ pub struct Plan {
     pub backends: Vec<String>,
     /// The first seed.
     pub first_seed: u64,
-    /// Runs of each row, with seeds counted up from the first.
+    /// Number of runs per row; their seeds count up from the first.
     pub seeds: u64,
     /// Tasks with their conditions.
     pub task: Vec<TaskPlan>,
@@ -46,14 +46,14 @@ pub struct Plan {
 /// The world that is the method's own simulator with a hidden truth.
 pub const MATCHED: &str = "matched";
 
-/// The world that differs from the simulator as a real one would; told of first.
+/// The world that differs from the simulator as a real one would; tables show it first.
 pub const PERTURBED: &str = "perturbed";
 
 impl Plan {
-    /// Takes repeated entries out and sets the perturbed world before all others.
+    /// Removes repeated entries and puts the perturbed world first.
     ///
     /// # Errors
-    /// When there is nothing to run, seeds run over, or two methods share a name.
+    /// When there is nothing to run, seeds overflow, or two methods share a name.
     pub fn check(&mut self) -> Result<()> {
         let wrong = |key: &str, message: &str| {
             Err(Error::Config {
@@ -94,7 +94,7 @@ impl Plan {
         Ok(())
     }
 
-    /// The cells in the order of the tables. Seeds are innermost.
+    /// The cells in the order of the tables; seeds are innermost.
     #[must_use]
     pub fn cells(&self) -> Vec<CellKey> {
         let mut cells = Vec::new();
@@ -127,10 +127,10 @@ impl Plan {
         self.methods.iter().find(|m| m.name == name)
     }
 
-    /// The smallest plan that holds both.
+    /// Extends the plan to the smallest one that contains both.
     ///
     /// # Errors
-    /// When they give one method's name to different parts, or one of them is a quick look.
+    /// When one method's name stands for different parts, or one of the plans is a quick look.
     pub fn union(&mut self, other: &Self) -> Result<()> {
         let wrong = |message: String| Err(Error::Failed(message));
         for method in &other.methods {
@@ -161,7 +161,7 @@ impl Plan {
     }
 }
 
-/// Keeps the first of equal entries.
+/// Removes repeated entries; the first of equal ones stays.
 fn distinct<T: PartialEq>(list: &mut Vec<T>) {
     let mut kept: Vec<T> = Vec::with_capacity(list.len());
     for entry in list.drain(..) {

@@ -5,17 +5,17 @@ use asid_core::{Error, Result};
 use crate::paper::STAND_IN;
 use crate::plan::PERTURBED;
 
-/// Runs of a row where nothing else is said.
+/// Default number of runs per row.
 pub const SEEDS: u64 = 10;
 
-/// Runs of a row in a quick look: the fewest of which an interval can be told.
+/// Runs per row in a quick look: the fewest that allow an interval.
 pub const QUICK_SEEDS: u64 = 3;
 
-/// What a quick look divides the budgets of all searches by. Iterations and populations both
-/// shrink, so that a run costs about a quarter.
+/// Divisor of the budgets of all searches in a quick look. Iterations and populations both shrink,
+/// so a run costs about a quarter.
 const QUICK: i64 = 2;
 
-/// Settings that say how long an algorithm searches.
+/// Settings that determine how long an algorithm searches.
 const BUDGETS: [&str; 2] = ["iterations", "population"];
 
 /// A table of the paper as a plan.
@@ -32,7 +32,7 @@ pub struct Preset {
 }
 
 const PRESETS: [Preset; 3] = [
-    // Downstream results in simulation. The sphere in both readings: `crate::paper`.
+    // Downstream results in simulation; both readings of the sphere, see `crate::paper`.
     Preset {
         table: 1,
         tasks: &[
@@ -73,8 +73,9 @@ pub fn of_table(table: u8) -> Result<Preset> {
         })
 }
 
-/// Budgets of a quick look for an algorithm's resolved settings: each half of what it was,
-/// rounded up, as `section.key` and value.
+/// Budgets of a quick look for an algorithm's resolved settings, as `section.key` and value.
+///
+/// Each is half of the full budget, rounded up.
 #[must_use]
 pub fn quick(section: &str, settings: &toml::Table) -> Vec<(String, i64)> {
     BUDGETS

@@ -1,4 +1,4 @@
-//! Rows: what the runs of one method under one condition come to.
+//! Rows: statistics of the runs of one method under one condition.
 
 mod ranking;
 mod types;
@@ -15,8 +15,9 @@ pub use types::{
     Best, ComparisonResult, Count, Identification, Improvement, Omitted, Pooled, Row, Summary,
 };
 
-/// Sums cells up. `cells` and `failures` are in the plan's order; `settings` gives the settings
-/// that a hash stands for.
+/// Summarises cells.
+///
+/// `cells` and `failures` are in the plan's order; `settings` returns the settings for a hash.
 #[must_use]
 pub fn summarise(
     plan: &Plan,
@@ -78,7 +79,7 @@ pub fn summarise(
     }
 }
 
-/// Version of this program, engines, and commit; the same for all cells.
+/// Version of this program, engines and commit, which all cells share.
 fn versions(cells: &[Cell]) -> serde_json::Value {
     let mut engines: Vec<&str> = Vec::new();
     for cell in cells {
@@ -94,7 +95,7 @@ fn versions(cells: &[Cell]) -> serde_json::Value {
     })
 }
 
-/// A row without figures.
+/// A row without statistics.
 fn row(cell: &Cell) -> Row {
     let key = &cell.key;
     let published = published(&key.task, &key.condition, &key.method, &key.world);
@@ -124,7 +125,7 @@ fn fill(row: &mut Row, cells: &[&Cell]) {
     row.summary = summary(&[cells]);
     row.seeds = cells.iter().map(|c| c.key.seed).collect();
     row.values = cells.iter().map(|c| c.value).collect();
-    // Without identification there is nothing to say of the unknowns but the prior.
+    // Without identification only the prior is known about the unknowns.
     if cells[0].residual.is_some() {
         row.identification = (0..cells[0].parameters.len())
             .map(|i| identification(cells, i))
@@ -147,7 +148,7 @@ fn identification(cells: &[&Cell], i: usize) -> Identification {
     }
 }
 
-/// Figures of cells by stratum, not yet compared with others.
+/// Statistics of cells by stratum, not yet compared with other methods.
 fn summary(strata: &[&[&Cell]]) -> Summary {
     let values: Vec<Vec<f64>> = strata
         .iter()
@@ -177,7 +178,7 @@ fn summary(strata: &[&[&Cell]]) -> Summary {
     }
 }
 
-/// Methods over all conditions of a task, where each has the same ones.
+/// Methods pooled over all conditions of a task, where each method has all of them.
 fn pool(rows: &[(Row, Vec<&Cell>)]) -> Vec<Pooled> {
     let mut arms: Vec<Vec<&(Row, Vec<&Cell>)>> = Vec::new();
     for row in rows {
@@ -187,7 +188,7 @@ fn pool(rows: &[(Row, Vec<&Cell>)]) -> Vec<Pooled> {
             None => arms.push(vec![row]),
         }
     }
-    // Only what holds every condition of its task that was run is comparable.
+    // Only methods with every condition of the task are comparable.
     let conditions = |task: &str| {
         let of = rows.iter().filter(|(r, _)| r.task == task);
         let names: std::collections::BTreeSet<&str> = of.map(|(r, _)| &*r.condition).collect();
@@ -230,8 +231,8 @@ fn pool(rows: &[(Row, Vec<&Cell>)]) -> Vec<Pooled> {
     pooled.into_iter().map(|(p, _)| p).collect()
 }
 
-/// Says of each row what makes it unequal to the others of its task, condition, world and engine:
-/// runs, and settings of algorithms that they share.
+/// Notes for each row how it differs from the others of its task, condition, world and engine: in
+/// its runs, and in the settings of shared algorithms.
 fn tell_differences(rows: &mut [Row], settings: &dyn Fn(&str) -> Option<toml::Table>) {
     let tables: Vec<Option<toml::Table>> = rows.iter().map(|r| settings(&r.settings)).collect();
     let told: Vec<Vec<String>> = (0..rows.len())
@@ -245,7 +246,7 @@ fn tell_differences(rows: &mut [Row], settings: &dyn Fn(&str) -> Option<toml::Ta
                 })
                 .collect();
             let mut told = Vec::new();
-            // The seeds that the most complete row has.
+            // The seeds of the most complete row.
             let full = mates
                 .iter()
                 .map(|&j| &rows[j].seeds)
@@ -274,7 +275,7 @@ fn tell_differences(rows: &mut [Row], settings: &dyn Fn(&str) -> Option<toml::Ta
     }
 }
 
-/// Settings of an algorithm that differ from those of the first row that uses it as well.
+/// Settings of an algorithm that differ from those of the first row that also uses it.
 fn other_settings(
     section: &str,
     i: usize,
@@ -286,7 +287,8 @@ fn other_settings(
     let Some(own) = of(i) else {
         return Vec::new();
     };
-    // What learned from another explorer's episodes is another algorithm, by the method's own parts.
+    // An algorithm trained on another explorer's episodes counts as another algorithm, since the
+    // methods differ.
     let same = |t: &toml::Table| {
         ["name", "explorer"]
             .iter()

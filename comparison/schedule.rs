@@ -1,7 +1,7 @@
-//! Workers that take pieces of work as they get free.
+//! Worker threads that take pieces of work as they become free.
 //!
-//! There is one queue and no barrier: whoever is done takes the next piece, so that a long run
-//! holds up no other one. What a piece gives may not depend on who did it or when.
+//! There is one queue and no barrier: a free worker takes the next piece, so a long run does not
+//! hold up the others. The result of a piece must not depend on which worker did it or when.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,14 +10,15 @@ use std::thread;
 
 use asid_core::{Error, Result};
 
-/// Stack of a worker in bytes: that of a process's first thread, which engines are used to.
+/// Stack size of a worker, bytes: that of a process's main thread, which engines expect.
 const STACK: usize = 8 << 20;
 
-/// What a panic in a piece of work said.
+/// Payload of a panic in a piece of work.
 pub type Panic = Box<dyn Any + Send>;
 
-/// Does each piece once, on `threads` threads, in order but side by side. No new piece is begun
-/// once `drain` is set. A panic ends its piece alone; `done` is told of it.
+/// Processes each piece once on `threads` threads; pieces start in order and run concurrently.
+///
+/// No new piece starts once `drain` is set. A panic ends only its own piece; `done` receives it.
 ///
 /// # Errors
 /// When a thread cannot be started.

@@ -1,9 +1,9 @@
-//! The identity of a run's settings.
+//! Hash of a run's settings.
 //!
-//! The hash is SHA-256 over canonical TOML: keys sorted, defaults filled in, without what may
-//! differ among the runs of a row (seed and condition) and without what the method does not use
-//! (the explorer of one that does not explore). A file that a setting names counts by what it
-//! holds, not by where it lies, so that a comparison has the same hashes in every folder.
+//! The hash is SHA-256 over canonical TOML with sorted keys and all defaults. It leaves out what
+//! may differ among the runs of a row (seed and condition) and what the method does not use (for
+//! example the explorer of a method that does not explore). A file that a setting names enters by
+//! its content and not by its path, so a comparison has the same hashes in every folder.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::method::{Method, NONE, TRUTH};
 
-/// Keys at the top that runs of a row differ in.
+/// Top-level keys in which the runs of a row differ.
 const LEFT_OUT: [&str; 3] = ["seed", "condition", "command"];
 
 /// Settings that name a file: section (empty for the top) and key.
@@ -22,10 +22,10 @@ const FILES: [(&str, &str); 4] = [
     ("identifier", "network"),
 ];
 
-/// Length of a hash in hexadecimal digits: 64 bits tell all settings apart that a person makes.
+/// Length of a hash in hexadecimal digits: 64 bits distinguish all settings that a person makes.
 const DIGITS: usize = 16;
 
-/// Resolved settings of a run as what identifies a row's settings.
+/// Reduces resolved settings of a run to those that identify a row's settings.
 #[must_use]
 pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
     let mut table = resolved.clone();
@@ -34,7 +34,7 @@ pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
     }
     if !method.explores() {
         table.insert("explorer".into(), named(NONE));
-        // Without an episode nothing is expected of one.
+        // Without an episode there is no expectation of one.
         table.remove("expected");
     }
     if !method.identifies() {
@@ -49,7 +49,7 @@ pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
     table
 }
 
-/// Puts what files hold, as a hash, in place of their paths wherever settings name one.
+/// Replaces file paths in the settings by hashes of the files' contents.
 pub fn name_contents(table: &mut toml::Table) {
     for (section, key) in FILES {
         let at = match section {
@@ -70,7 +70,7 @@ pub fn name_contents(table: &mut toml::Table) {
     }
 }
 
-/// Puts what a file holds in place of its path; one that cannot be read stays.
+/// Replaces a file's path by the hash of its content; an unreadable file's path stays.
 fn count_contents(path: &mut String) {
     let contents = (!path.is_empty()).then(|| of_file(Path::new(path)));
     if let Some(contents) = contents.flatten() {
@@ -84,16 +84,16 @@ fn named(name: &str) -> toml::Value {
     section.into()
 }
 
-/// `sha256:…` of a file; none where it cannot be read.
+/// Hash of a file as `sha256:…`; `None` where it cannot be read.
 fn of_file(path: &Path) -> Option<String> {
     let bytes = std::fs::read(path).ok()?;
     Some(format!("sha256:{}", digest(&bytes)))
 }
 
-/// Canonical settings as text, and its hash: the first 16 digits of SHA-256.
+/// The hash of canonical settings (the first 16 digits of SHA-256), and their text.
 #[must_use]
 pub fn hash(canonical: &toml::Table) -> (String, String) {
-    // A table of this crate's keeps its keys sorted.
+    // A table of this crate keeps its keys sorted.
     let text = canonical.to_string();
     (digest(text.as_bytes()), text)
 }
@@ -108,7 +108,7 @@ pub fn digest(bytes: &[u8]) -> String {
     all[..DIGITS].to_owned()
 }
 
-/// Entries that differ, dotted, with both values; `-` for one that is not there.
+/// Entries that differ: dotted key and both values; `-` for a missing one.
 #[must_use]
 pub fn differences(a: &toml::Table, b: &toml::Table) -> Vec<(String, String, String)> {
     let mut found = Vec::new();
@@ -138,7 +138,7 @@ fn compare(
     }
 }
 
-/// The first difference between two settings in one phrase; empty where there is none.
+/// The first difference between two settings in one phrase; empty where they are equal.
 #[must_use]
 pub fn first_difference(a: &toml::Table, b: &toml::Table) -> String {
     let all = differences(a, b);

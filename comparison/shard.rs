@@ -11,10 +11,10 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Whether the cell at this place of the plan belongs to the share.
+    /// Whether the cell at this position of the plan belongs to the share.
     ///
-    /// Shares are dealt like cards. Seeds are the innermost order of a plan, so each share
-    /// gets some of every row, and the shares cost about the same.
+    /// Cells are dealt out in turn. Seeds are the innermost order of a plan, so each share gets
+    /// part of every row, and all shares cost about the same.
     #[must_use]
     pub fn holds(self, place: usize) -> bool {
         place % self.count + 1 == self.index

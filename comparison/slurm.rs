@@ -1,34 +1,34 @@
-//! A comparison as a job array of Slurm.
+//! A comparison as a Slurm job array.
 //!
-//! Each task of the array works on its share, and all write into one folder; the last one to
-//! finish finds every cell there and writes the tables. Some time before the limit Slurm sends
-//! `SIGUSR1`: the program then begins no new cell, finishes those that run, and the task is
-//! queued again for the rest. A task that is killed and queued again goes on where it stood.
+//! Each task of the array works on its share, and all write into one folder. The last one to finish
+//! finds all cells and writes the tables. Some time before the limit Slurm sends `SIGUSR1`. The
+//! program then starts no new cell and finishes the running ones, and the task is queued again for
+//! the rest. A task that is killed and queued again continues where it stopped.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What the script says.
+/// Content of the batch script.
 #[derive(Clone, Debug)]
 pub struct Script<'a> {
-    /// The program.
+    /// Path of the program.
     pub program: &'a Path,
     /// The comparison's folder, with its `config.toml`.
     pub out: &'a Path,
-    /// Tasks of the array.
+    /// Number of tasks of the array.
     pub jobs: usize,
-    /// Threads of a task.
+    /// Threads per task.
     pub threads: usize,
-    /// Further options of sbatch; they win over the script's own.
+    /// Further options of sbatch; they override the script's own.
     pub options: &'a [String],
 }
 
-/// Seconds before the limit at which a task is told to begin nothing new: more than a run of any
-/// built-in task takes on one thread.
+/// Time before the limit at which a task is told to start nothing new, s: longer than a run of any
+/// built-in task on one thread.
 const GRACE: u32 = 300;
 
 impl Script<'_> {
-    /// The script.
+    /// Returns the script's text.
     #[must_use]
     pub fn text(&self) -> String {
         let mut head = String::new();
@@ -41,7 +41,7 @@ impl Script<'_> {
             "--requeue".to_owned(),
             format!("--signal=B:USR1@{GRACE}"),
         ];
-        // Of an option that is given twice sbatch takes the first.
+        // sbatch uses the first of two equal options.
         let given = |o: &str| o.split('=').next().unwrap_or(o).to_owned();
         let wins = |o: &String| !self.options.iter().any(|x| given(x) == given(o));
         for option in self.options.iter().chain(own.iter().filter(|o| wins(o))) {
@@ -74,15 +74,17 @@ exit "$status"
     }
 }
 
-/// The file of each task's log, as sbatch reads an option of a script: a backslash takes the meaning of the next character, in quotes too.
-/// In a file's name `%A` and `%a` are the numbers of array and task, and `%%` is `%`.
+/// Path of each task's log file, escaped for an `#SBATCH` option.
+///
+/// sbatch reads a backslash as an escape of the next character, in quotes too. In a file name `%A`
+/// and `%a` are the numbers of array and task, and `%%` is `%`.
 fn log_of_tasks(out: &Path) -> String {
     let out = out.display().to_string().replace('%', "%%");
     let out = out.replace('\\', r"\\").replace('"', r#"\""#);
     format!("\"{out}/slurm/%A_%a.log\"")
 }
 
-/// A path as one word of a shell.
+/// Quotes a path as one shell word.
 fn quoted(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', r"'\''"))
 }
@@ -112,7 +114,8 @@ mod tests {
         assert!(text.contains("#SBATCH --output=\"/data/it's/slurm/%A_%a.log\"\n"));
     }
 
-    /// Without quotes sbatch ends the option at a space or `#`, refuses a single quote, and puts the number of the job in place of `%j`.
+    /// Without quotes sbatch ends the option at a space or `#`. It refuses a single quote and
+    /// replaces `%j` by the job number.
     #[test]
     fn logs_of_tasks_go_to_a_folder_of_any_name() {
         for (folder, option) in [

@@ -1,4 +1,4 @@
-//! The folder of a comparison: a file a cell, written whole or not at all.
+//! The folder of a comparison: one file per cell, written atomically.
 //!
 //! ```text
 //! config.toml            the plan and the settings that were given
@@ -9,9 +9,9 @@
 //! policies/NAME/         what was trained
 //! ```
 //!
-//! A file is written beside its place under a name of its own and renamed, so that a reader finds
-//! it whole or not at all whenever the writer is stopped, and several machines may write into one
-//! folder: equal cells have equal bytes, and it does not matter whose is kept.
+//! A file is written under a unique temporary name and then renamed. Whenever the writer is
+//! stopped, a reader finds the file complete or not at all. Several machines may write into one
+//! folder: equal cells have equal bytes, so it does not matter whose file is kept.
 
 use std::fs;
 use std::io::Write as _;
@@ -23,18 +23,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::cell::{Cell, CellKey, Failure};
 
-/// Held while a file is written, so that whoever ends the process can wait for it.
+/// Held while a file is written, so that code that ends the process can wait for it.
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// Waits until no file is being written, and holds all writers up from then on.
+/// Waits until no file is being written, and blocks all writers while the guard lives.
 pub fn no_writer() -> MutexGuard<'static, ()> {
     WRITING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Writes a file whole or not at all.
+/// Writes a file atomically.
 ///
 /// # Errors
-/// [`Error::Failed`] naming the file.
+/// [`Error::Failed`], which names the file.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     let _held = no_writer();
     let failed =
@@ -45,7 +45,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
     let beside = folder.join(format!(".{name}.{}", unique()));
     let written = fs::File::create(&beside).and_then(|mut file| {
         file.write_all(text.as_bytes())?;
-        // The name may not be there before what it stands for.
+        // The data must be on disk before the name is.
         file.sync_all()?;
         fs::rename(&beside, path)
     });
@@ -55,7 +55,7 @@ pub fn write(path: &Path, text: &str) -> Result<()> {
     })
 }
 
-/// Part of a name that no other process or thread of any machine uses at this time.
+/// Part of a name that no other process or thread on any machine uses at this time.
 #[must_use]
 pub fn unique() -> String {
     use std::hash::{BuildHasher as _, RandomState};
@@ -63,24 +63,24 @@ pub fn unique() -> String {
     format!("{}-{random:016x}", std::process::id())
 }
 
-/// Seconds that a cell took, kept apart from the cell.
+/// Run time of a cell, stored separately from the cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellTime {
-    /// Which one it is.
+    /// Key of the cell.
     #[serde(flatten)]
     pub key: CellKey,
     /// Wall-clock time on one thread, s.
     pub wall_s: f64,
 }
 
-/// The folder.
+/// The folder of a comparison.
 #[derive(Clone, Debug)]
 pub struct Store {
     root: PathBuf,
 }
 
 impl Store {
-    /// The store in this folder, which need not be there yet.
+    /// The store in this folder, which may not exist yet.
     #[must_use]
     pub fn new(root: &Path) -> Self {
         Self {
@@ -88,31 +88,31 @@ impl Store {
         }
     }
 
-    /// Its folder.
+    /// The folder's path.
     #[must_use]
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Whether there is a comparison in the folder.
+    /// Whether the folder holds a comparison.
     #[must_use]
     pub fn is_begun(&self) -> bool {
         self.config().is_file()
     }
 
-    /// The plan's file.
+    /// Path of the plan's file.
     #[must_use]
     pub fn config(&self) -> PathBuf {
         self.root.join("config.toml")
     }
 
-    /// Where trained policies are.
+    /// Path of the trained policies.
     #[must_use]
     pub fn policies(&self) -> PathBuf {
         self.root.join("policies")
     }
 
-    /// Where a cell is or would be.
+    /// Path of a cell's file, whether it exists or not.
     #[must_use]
     pub fn place(&self, key: &CellKey) -> PathBuf {
         self.file("cells", &key.stem())
@@ -122,10 +122,10 @@ impl Store {
         self.root.join(folder).join(format!("{stem}.json"))
     }
 
-    /// A cell; none where it is not there yet.
+    /// Reads a cell; `None` where it does not exist yet.
     ///
     /// # Errors
-    /// When its file cannot be read or is another cell's.
+    /// When its file cannot be read or holds another cell.
     pub fn cell(&self, key: &CellKey) -> Result<Option<Cell>> {
         let path = self.place(key);
         let cell: Option<Cell> = read(&path)?;
@@ -138,13 +138,13 @@ impl Store {
         }
     }
 
-    /// Keeps a cell with the seconds that it took, and forgets that it failed.
+    /// Stores a cell with its run time, and removes its failure.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn keep(&self, cell: &Cell, wall_s: Option<f64>) -> Result<()> {
         let stem = cell.key.stem();
-        // The cell last: where it is, all of it is.
+        // The cell is written last: where it exists, everything that belongs to it exists.
         if let Some(wall_s) = wall_s {
             let time = CellTime {
                 key: cell.key.clone(),
@@ -157,7 +157,7 @@ impl Store {
         Ok(())
     }
 
-    /// Why a cell is not there; none where nothing is known.
+    /// The failure of a cell; `None` where there is none.
     ///
     /// # Errors
     /// When its file cannot be read.
@@ -165,7 +165,7 @@ impl Store {
         read(&self.file("failures", &key.stem()))
     }
 
-    /// Notes why a cell is not there.
+    /// Stores the failure of a cell.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -173,7 +173,7 @@ impl Store {
         write(&self.file("failures", &failure.key.stem()), &text(failure)?)
     }
 
-    /// Seconds that a cell took, where they are known.
+    /// Run time of a cell, where it is known.
     ///
     /// # Errors
     /// When its file cannot be read.
@@ -181,7 +181,7 @@ impl Store {
         read(&self.file("times", &key.stem()))
     }
 
-    /// All cells of the folder, by the names of their files.
+    /// Reads all files of a kind, sorted by their names.
     ///
     /// # Errors
     /// When one cannot be read.
@@ -208,14 +208,14 @@ impl Store {
             .collect())
     }
 
-    /// The settings that a hash stands for; none where they were not kept.
+    /// The settings with this hash; `None` where they are not stored.
     #[must_use]
     pub fn settings(&self, hash: &str) -> Option<toml::Table> {
         let path = self.root.join("settings").join(format!("{hash}.toml"));
         fs::read_to_string(path).ok()?.parse().ok()
     }
 
-    /// Keeps the settings that a hash stands for.
+    /// Stores settings under their hash.
     ///
     /// # Errors
     /// When they cannot be written.
@@ -228,7 +228,7 @@ impl Store {
     }
 }
 
-/// Kinds of files of which there is one a cell.
+/// Kinds of files with one file per cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`Cell`]s.
@@ -296,7 +296,7 @@ mod tests {
         assert!(store.failure(&wanted).unwrap().is_none());
         assert_eq!(store.time(&wanted).unwrap().unwrap().wall_s, 2.5);
         assert_eq!(store.all::<Cell>(Kind::Cells).unwrap().len(), 1);
-        // No half of a file is left beside.
+        // No temporary file is left.
         assert_eq!(
             fs::read_dir(folder.path().join("cells")).unwrap().count(),
             1

@@ -1,4 +1,4 @@
-//! The tables of a comparison.
+//! Formats the tables of a comparison.
 
 mod paper;
 
@@ -8,13 +8,13 @@ use crate::grid::{Entry, Grid};
 use crate::plan::Plan;
 use crate::rows::{ComparisonResult, Row, Summary};
 
-/// What the main table's columns mean.
+/// Explanation of the main table's columns.
 const MAIN: &str = "Lower is better. IQM: interquartile mean of the metric over seeds with its 95 % bootstrap interval; \
     success with its 95 % Wilson interval; in bold the best of a condition where its interval is apart from the next method's (of the metric: from six runs on). \
     P(better): probability that a run is better than one of the method named, ties counting half. The oracle is told the truth \
     and is ranked with nobody. ";
 
-/// All tables, most important first.
+/// All tables, the most important first.
 #[must_use]
 pub fn grids(plan: &Plan, result: &ComparisonResult) -> Vec<Grid> {
     let mut grids = Vec::new();
@@ -28,7 +28,7 @@ pub fn grids(plan: &Plan, result: &ComparisonResult) -> Vec<Grid> {
     grids
 }
 
-/// Sentences that belong to every form of a result: what is missing, failed or cut short.
+/// Sentences that accompany every form of a result: what is missing, failed or shortened.
 #[must_use]
 pub fn notes(result: &ComparisonResult) -> Vec<String> {
     let mut notes = Vec::new();
@@ -54,7 +54,7 @@ pub fn notes(result: &ComparisonResult) -> Vec<String> {
     notes
 }
 
-/// The tables and notes as Markdown.
+/// Formats the tables and notes as Markdown.
 #[must_use]
 pub fn markdown(plan: &Plan, result: &ComparisonResult) -> String {
     let mut text = String::new();
@@ -68,7 +68,7 @@ pub fn markdown(plan: &Plan, result: &ComparisonResult) -> String {
     text + &tables.join("\n")
 }
 
-/// A value of the metric with its interval; metrics in metres or radians are small numbers.
+/// A metric value with its interval; small values (metres, radians) get three decimals.
 fn valued(x: f64, [low, high]: [f64; 2]) -> String {
     let digits = if high.abs() < 1.0 { 3 } else { 1 };
     format!("{x:.digits$} ({low:.digits$} to {high:.digits$})")
@@ -108,7 +108,7 @@ fn better(s: &Summary) -> Entry {
     text.into()
 }
 
-/// A row a task, engine, condition and method; columns of each world side by side.
+/// The main table: one row per task, engine, condition and method, and columns for each world.
 fn main(plan: &Plan, result: &ComparisonResult) -> Grid {
     let worlds: Vec<&String> = plan
         .worlds
@@ -186,7 +186,7 @@ fn published(row: &Row) -> String {
     })
 }
 
-/// Methods over all conditions of a task.
+/// Table of the methods pooled over all conditions of a task.
 fn pooled(result: &ComparisonResult) -> Option<Grid> {
     let mut grid = Grid::new(
         "Over all conditions",
@@ -218,7 +218,7 @@ fn pooled(result: &ComparisonResult) -> Option<Grid> {
     (!grid.rows.is_empty()).then_some(grid)
 }
 
-/// How well unknowns were identified.
+/// Table of how well the unknowns were identified.
 fn identification(result: &ComparisonResult) -> Option<Grid> {
     let mut grid = Grid::new(
         "What was identified",
@@ -251,7 +251,7 @@ fn identification(result: &ComparisonResult) -> Option<Grid> {
     (!grid.rows.is_empty()).then_some(grid)
 }
 
-/// Four decimals, and two figures where these would not show it.
+/// Formats with four decimals, or with two significant figures where the value would be lost.
 fn with_unit(x: f64, unit: &str) -> String {
     let text = if x != 0.0 && x.abs() < 1e-3 {
         format!("{x:.1e} {unit}")
@@ -261,7 +261,7 @@ fn with_unit(x: f64, unit: &str) -> String {
     text.trim_end().to_owned()
 }
 
-/// What stands behind the methods' names.
+/// Table of the parts of each method.
 fn methods(result: &ComparisonResult) -> Grid {
     let mut grid = Grid::new(
         "Methods",

@@ -1,30 +1,30 @@
-//! Statistics of a handful of runs or cases.
+//! Statistics of a small number of runs or cases.
 //!
-//! After Agarwal, Schwarzer, Castro, Courville and Bellemare 2021, "Deep Reinforcement Learning at
-//! the Edge of the Statistical Precipice" (NeurIPS): the interquartile mean in place of the mean,
-//! percentile bootstrap intervals that resample within each condition (stratified), and the
-//! probability of improvement. Shares of successes have Wilson's interval (Wilson 1927; Brown, Cai
-//! and DasGupta 2001 on why), which is right at 0 and at 1 too.
+//! They follow Agarwal, Schwarzer, Castro, Courville and Bellemare 2021, "Deep Reinforcement
+//! Learning at the Edge of the Statistical Precipice" (NeurIPS): the interquartile mean instead of
+//! the mean, percentile bootstrap intervals that resample within each condition (stratified), and
+//! the probability of improvement. Shares of successes have Wilson's interval (Wilson 1927; Brown,
+//! Cai and DasGupta 2001 give the reasons), which is also correct at 0 and 1.
 
 use asid_core::Streams;
 use asid_core::rng::Rng;
 use rand::Rng as _;
 
-/// Resamples of a bootstrap: the 2.5 % quantile then rests on 50 of them, and its own scatter is
-/// below a tenth of the interval.
+/// Number of bootstrap resamples: the 2.5 % quantile then rests on 50 of them, and its own scatter
+/// is below a tenth of the interval.
 const RESAMPLES: usize = 2000;
 
 /// The normal distribution's 97.5 % quantile.
 const Z95: f64 = 1.959_963_984_540_054;
 
-/// Values in ascending order.
+/// Returns the values in ascending order.
 pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut v: Vec<f64> = values.into_iter().collect();
     v.sort_by(f64::total_cmp);
     v
 }
 
-/// The median; NaN of nothing.
+/// Median; NaN for no values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let v = sorted(values);
     match v.len() {
@@ -34,13 +34,13 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     }
 }
 
-/// The mean; NaN of nothing.
+/// Mean; NaN for no values.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Sample standard deviation; 0 of a single value.
+/// Sample standard deviation; 0 for a single value.
 #[must_use]
 pub fn deviation(values: &[f64]) -> f64 {
     let center = mean(values);
@@ -48,8 +48,8 @@ pub fn deviation(values: &[f64]) -> f64 {
     (squares / (values.len() as f64 - 1.0).max(1.0)).sqrt()
 }
 
-/// Interquartile mean: of what is left when a quarter of the values, rounded down, is cut from
-/// each end. NaN of nothing.
+/// Interquartile mean: the mean after a quarter of the values, rounded down, is cut from each end.
+/// NaN for no values.
 #[must_use]
 pub fn interquartile_mean(values: &[f64]) -> f64 {
     let v = sorted(values.iter().copied());
@@ -57,7 +57,7 @@ pub fn interquartile_mean(values: &[f64]) -> f64 {
     mean(&v[cut..v.len() - cut])
 }
 
-/// Wilson's 95 % interval of a share.
+/// Wilson's 95 % interval of a share of successes.
 #[must_use]
 pub fn wilson(successes: usize, n: usize) -> [f64; 2] {
     if n == 0 {
@@ -68,24 +68,27 @@ pub fn wilson(successes: usize, n: usize) -> [f64; 2] {
     let z2 = Z95 * Z95;
     let center = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z95 / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    // Rounding alone would leave 0 and 1 outside where all or none succeeded.
+    // Rounding alone would exclude 0 and 1 where none or all succeeded.
     let low = if share == 0.0 { 0.0 } else { center - half };
     let high = if share == 1.0 { 1.0 } else { center + half };
     [low, high]
 }
 
-/// Values by stratum: a condition each.
+/// Values by stratum; each condition is one.
 pub type Strata = Vec<Vec<f64>>;
 
-/// 95 % percentile bootstrap interval of a statistic of all values, each stratum resampled by
-/// itself. The same values give the same interval.
+/// 95 % percentile bootstrap interval of a statistic of all values, with each stratum resampled
+/// separately.
+///
+/// Equal values give equal intervals.
 pub fn bootstrap(strata: &[Vec<f64>], statistic: impl Fn(&[f64]) -> f64) -> [f64; 2] {
     let mut rng = Streams::new(0).stream("bootstrap");
     quantiles((0..RESAMPLES).map(|_| statistic(&resample(strata, &mut rng).concat())))
 }
 
-/// Probability that a run of `ours` has a lower value than one of `theirs`, ties counting half:
-/// the Mann-Whitney statistic over the number of pairs, averaged over strata.
+/// Probability that a run of `ours` has a lower value than one of `theirs`; ties count half.
+///
+/// It is the Mann-Whitney statistic divided by the number of pairs, averaged over strata.
 #[must_use]
 pub fn improvement(ours: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
     let by_stratum: Vec<f64> = ours
@@ -106,7 +109,7 @@ pub fn improvement(ours: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
     mean(&by_stratum)
 }
 
-/// 95 % bootstrap interval of [`improvement`], both methods resampled within each stratum.
+/// 95 % bootstrap interval of [`improvement`], with both methods resampled within each stratum.
 #[must_use]
 pub fn improvement_interval(ours: &[Vec<f64>], theirs: &[Vec<f64>]) -> [f64; 2] {
     let mut rng = Streams::new(0).stream("improvement");
@@ -147,11 +150,11 @@ mod tests {
             interquartile_mean(&ten),
             (4.0 + 9.0 + 16.0 + 25.0 + 36.0 + 49.0) / 6.0
         );
-        // Up to three values there is nothing to cut.
+        // Of three or fewer values nothing is cut.
         assert_eq!(interquartile_mean(&[1.0, 2.0, 6.0]), 3.0);
     }
 
-    /// Brown, Cai and DasGupta 2001 and by hand: 8 of 10, 0 of 10.
+    /// Brown, Cai and DasGupta 2001, and by hand: 8 of 10, 0 of 10.
     #[test]
     fn wilsons_interval_by_hand() {
         let [low, high] = wilson(8, 10);
@@ -173,10 +176,10 @@ mod tests {
         // Of 6 pairs, 1 < {2, 3, 4} wins three; 3 < 4 wins one, 3 = 3 ties, 3 > 2 loses.
         let p = improvement(&[vec![1.0, 3.0]], &[vec![2.0, 3.0, 4.0]]);
         assert!((p - 4.5 / 6.0).abs() < 1e-15);
-        // Strata are compared within themselves, and weigh the same whatever their size.
+        // Strata are compared separately and have equal weight whatever their size.
         let p = improvement(&[vec![0.0], vec![9.0, 9.0]], &[vec![1.0], vec![1.0]]);
         assert_eq!(p, 0.5);
-        // All pairs alike: no doubt is left that the data know of.
+        // All pairs are alike: the data show no uncertainty.
         assert_eq!(
             improvement_interval(&[vec![0.0; 4]], &[vec![1.0; 4]]),
             [1.0, 1.0]
@@ -187,7 +190,7 @@ mod tests {
         );
     }
 
-    /// Strata that lie far apart widen an interval only if they are mixed.
+    /// Strata far apart widen an interval only if they are mixed.
     #[test]
     fn strata_are_resampled_by_themselves() {
         let strata = vec![vec![0.0, 0.1, 0.2, 0.3], vec![100.0, 100.1, 100.2, 100.3]];
@@ -197,9 +200,9 @@ mod tests {
         assert!(high - low > 30.0, "{low} {high}");
     }
 
-    /// The mean of two normal strata, 20 values each: nominal 95 %. The percentile bootstrap is
-    /// known to fall a little short at such sizes (by sqrt((n - 1) / n) in width and by the
-    /// missing t quantile, 93.3 % here); 300 repetitions scatter by 1.4 %.
+    /// The mean of two normal strata, 20 values each: nominal 95 %. At such sizes the percentile
+    /// bootstrap is known to fall slightly short (by sqrt((n - 1) / n) in width and by the missing
+    /// t quantile; 93.3 % here). 300 repetitions scatter by 1.4 %.
     #[test]
     fn an_interval_holds_the_truth_as_often_as_it_says() {
         let mut rng = Streams::new(7).stream("coverage");

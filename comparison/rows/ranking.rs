@@ -1,28 +1,29 @@
-//! Which of several methods is the best, and how surely.
+//! Ranks methods, with the certainty of the ranking.
 
 use asid_statistics::{improvement, improvement_interval};
 
 use super::types::{Improvement, Row, Summary};
 use crate::method::ORACLE;
 
-/// A method's figures among those that it is ranked with.
+/// One method in a ranking.
 pub struct Entry<'a> {
     /// Its name.
     pub method: &'a str,
     /// Values of the metric by stratum.
     pub values: Vec<Vec<f64>>,
-    /// Its figures, which are completed.
+    /// Its statistics, which the ranking completes.
     pub summary: &'a mut Summary,
 }
 
-/// Runs from which on a bootstrap interval may set a method apart. It cannot reach beyond the values
-/// that were seen, and only from six on do these enclose the median with 95 % (1 - 2 / 2^6 = 97 %).
+/// Fewest runs with which a bootstrap interval may set a method apart. The interval cannot reach
+/// beyond the observed values, and only from six runs on do these enclose the median with 95 % (1 -
+/// 2 / 2^6 = 97 %).
 pub const FEWEST: usize = 6;
 
-/// Compares methods with each other. The oracle is no method: it shows what the task allows.
+/// Compares methods with each other. The oracle is left out: it shows what the task allows.
 pub fn compare(mut entries: Vec<Entry<'_>>) {
     entries.retain(|e| e.method != ORACLE);
-    // Lower is better; among equals the one that succeeds more often.
+    // Lower is better; among equals the method that succeeds more often.
     entries.sort_by(|a, b| {
         let by_metric = a.summary.iqm.total_cmp(&b.summary.iqm);
         by_metric.then(b.summary.success_rate.total_cmp(&a.summary.success_rate))

@@ -1,10 +1,10 @@
-//! Rows of a few cells, by hand.
+//! Rows of a few hand-made cells.
 
 use super::*;
 use crate::cell::tests::{cell, key};
 use crate::plan::tests::plan;
 
-/// Values of a method under a condition, seeds from 0; success below 5.
+/// Cells of a method under a condition with these values, seeds from 0; success below 5.
 fn cells(condition: &str, method: &str, values: &[f64]) -> Vec<Cell> {
     let of = values.iter().zip(0..);
     of.map(|(&v, seed)| cell(key("t", condition, method, seed), v, v < 5.0))
@@ -37,10 +37,10 @@ fn the_best_is_marked_only_where_its_interval_is_apart() {
     let better = asid.summary.improvement.as_ref().unwrap();
     assert_eq!((&*better.over, better.probability), ("random", 1.0));
     assert!(random.summary.improvement.is_none() && oracle.summary.improvement.is_none());
-    // Five runs are too few for their spread to say anything.
+    // Five runs are too few for a meaningful interval.
     let few = [cells("x", "asid", &[0.0; 5]), cells("x", "dr", &[9.0; 5])];
     assert!(!summed(&few.concat()).rows[0].summary.best.iqm);
-    // Two alike: neither is best.
+    // Two equal methods: neither is best.
     let alike = summed(&[cells("x", "asid", &[0.0; 3]), cells("x", "dr", &[0.0; 3])].concat());
     assert!(alike.rows.iter().all(|r| r.summary.best == Best::default()));
 }
@@ -65,7 +65,7 @@ fn fewer_runs_and_other_budgets_are_said_of_a_row() {
     assert_eq!(result.rows[2].differs, ["2 runs, others 3"]);
 }
 
-/// Estimators of two explorers' episodes are two algorithms; another commit is a difference.
+/// Estimators for two explorers' episodes are two algorithms; another commit is a difference.
 #[test]
 fn an_estimator_of_another_explorer_is_no_other_setting_and_another_commit_is_one() {
     let mut all = [

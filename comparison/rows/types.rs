@@ -1,4 +1,4 @@
-//! What a comparison's `result.json` holds.
+//! Types of a comparison's `result.json`.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! The tables of the paper with this comparison's numbers beside the published ones.
+//! The tables of the paper, with this comparison's numbers next to the published ones.
 
 use super::{iqm, success};
 use crate::grid::{Entry, Grid};
@@ -7,8 +7,8 @@ use crate::paper::{Measure, measure};
 use crate::plan::Plan;
 use crate::rows::{ComparisonResult, Omitted, Row};
 
-/// One table for each world and engine, laid out as the paper's: a row a method, a column a task
-/// and condition, the paper's value below ours.
+/// One table for each world and engine in the paper's layout: one row per method, one column per
+/// task and condition, the paper's value below ours.
 pub fn as_in_the_paper(plan: &Plan, result: &ComparisonResult, table: u8) -> Vec<Grid> {
     let mut grids = Vec::new();
     for world in &plan.worlds {
