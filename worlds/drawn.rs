@@ -34,8 +34,8 @@ pub struct Perturbation {
 pub struct TrackerPerturbation {
     /// Age of a reading, s.
     pub latency: f64,
-    /// Constant error of each signal: numbers and vectors in their unit, a rotation vector (rad) for
-    /// an orientation.
+    /// Constant error of each signal: numbers and vectors in their unit, a rotation vector (rad)
+    /// for an orientation.
     pub offset: BTreeMap<String, Vec<f64>>,
     /// Frames from one reading to the next.
     pub every: usize,
