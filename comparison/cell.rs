@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::number;
 
-/// What tells a cell from all others.
+/// Key that identifies a cell.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CellKey {
     /// Task.

@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use crate::PerturbationRanges;
 
-/// The values that a world's seed drew. Each has a stream of its own, so that a range that is
-/// changed moves no other value.
+/// The values drawn by a world's seed. Each has its own random stream, so that a changed range
+/// affects no other value.
 #[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 #[schemars(rename = "DrawnPerturbation")]
 pub struct Perturbation {

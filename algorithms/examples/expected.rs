@@ -13,7 +13,7 @@
 //! is one unknown in one episode: truth, estimate and actual deviation, then three ratios of
 //! expected to actual deviation. The expectations are:
 //!
-//! 1. the one that explorers are paid by,
+//! 1. the one that rewards explorers,
 //! 2. the noise model of identification, reading by reading,
 //! 3. the same with the correlation of the roughness.
 //!
