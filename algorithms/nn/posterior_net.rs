@@ -104,7 +104,7 @@ impl PosteriorNet {
 
     /// Takes one step of Adam on some rows; returns the loss.
     ///
-    /// With `keep` (`rows x marks`, 0 or 1) only the marked marks are shown.
+    /// With `keep` (`rows x marks`, 0 or 1) only the marks with a 1 are shown.
     pub fn step(&mut self, rows: &Rows, keep: Option<&Tensor>) -> f64 {
         let loss = match keep {
             None => self.loss(rows),
