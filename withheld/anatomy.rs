@@ -1,4 +1,4 @@
-//! What a machine consists of: the places that a cause can act on, read off its model.
+//! The parts of a machine, read from its model: the places at which a cause can act.
 
 mod parts;
 
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::machine::{Machine, Shows};
 use parts::{drive, joint_kind, reads};
 
-/// A machine, taken apart.
+/// A machine and the parts of its model.
 #[derive(Clone, Debug)]
 pub struct Anatomy {
     /// The machine.
@@ -21,27 +21,27 @@ pub struct Anatomy {
     pub document: Element,
     /// Joints, in the model's order.
     pub joints: Vec<Joint>,
-    /// Actuators.
+    /// Actuators, in the model's order.
     pub drives: Vec<Drive>,
-    /// Sensors.
+    /// Sensors, in the model's order.
     pub sensors: Vec<Sensor>,
-    /// Bodies in order; the first is the world.
+    /// Bodies, in the model's order; the first is the world.
     pub bodies: Vec<String>,
-    /// Geoms in order.
+    /// Geoms, in the model's order.
     pub geoms: Vec<String>,
-    /// Reference position.
+    /// Reference position `qpos0`.
     pub qpos0: Vec<f64>,
-    /// Number of velocities.
+    /// Number of degrees of freedom.
     pub nv: usize,
     /// Time step of the study's model, s.
     pub timestep: f64,
 }
 
 impl Anatomy {
-    /// Takes a machine apart.
+    /// Reads the parts of a machine from its model.
     ///
     /// # Errors
-    /// Where MuJoCo refuses the model, or an element that the machine names is not there.
+    /// If MuJoCo refuses the model, or if the model lacks an element that the machine names.
     pub fn of(machine: &Machine) -> Result<Self> {
         let refused = |message: String| Error::Model {
             machine: machine.name.to_owned(),
@@ -71,7 +71,8 @@ impl Anatomy {
                     let Some(kind) = joint_kind(tag, e) else {
                         continue;
                     };
-                    // References to joints further down have the same tag and no name.
+                    // References to joints, further down in the document, have the same tag but no
+                    // name.
                     let id = find(MjtObjBase::mjOBJ_JOINT, "joint", &name)?;
                     joints.push(Joint {
                         kind,
@@ -101,7 +102,7 @@ impl Anatomy {
                 reads: reads(&model, id, &joints),
                 address: model.sensor_adr()[id] as usize,
                 len: model.sensor_dim()[id] as usize,
-                // A rotation by a small angle turns a quaternion by half of it.
+                // A rotation by a small angle changes a quaternion by half of that angle.
                 noise: if e.tag == "framequat" {
                     noise / 2.0
                 } else {
@@ -154,7 +155,7 @@ impl Anatomy {
     /// Index of a joint.
     ///
     /// # Errors
-    /// Where there is none of that name; so for the other places.
+    /// If there is no joint of that name.
     pub fn joint(&self, name: &str) -> Result<usize> {
         self.place(&self.joints, "joint", name, |j| j.name == name)
     }
@@ -162,7 +163,7 @@ impl Anatomy {
     /// Index of an actuator.
     ///
     /// # Errors
-    /// Where there is none of that name.
+    /// If there is no actuator of that name.
     pub fn drive(&self, name: &str) -> Result<usize> {
         self.place(&self.drives, "actuator", name, |d| d.name == name)
     }
@@ -170,7 +171,7 @@ impl Anatomy {
     /// Index of a sensor.
     ///
     /// # Errors
-    /// Where there is none of that name.
+    /// If there is no sensor of that name.
     pub fn sensor(&self, name: &str) -> Result<usize> {
         self.place(&self.sensors, "sensor", name, |s| s.name == name)
     }
@@ -178,7 +179,7 @@ impl Anatomy {
     /// Index of a body.
     ///
     /// # Errors
-    /// Where there is none of that name.
+    /// If there is no body of that name.
     pub fn body(&self, name: &str) -> Result<usize> {
         self.place(&self.bodies, "body", name, |b| b == name)
     }
@@ -186,12 +187,12 @@ impl Anatomy {
     /// Index of a geom.
     ///
     /// # Errors
-    /// Where there is none of that name.
+    /// If there is no geom of that name.
     pub fn geom(&self, name: &str) -> Result<usize> {
         self.place(&self.geoms, "geom", name, |g| g == name)
     }
 
-    /// The drive of a joint, where exactly one drives it and nothing else.
+    /// The drive of a joint, if exactly one drive acts on it.
     #[must_use]
     pub fn drive_of(&self, joint: usize) -> Option<usize> {
         let mut all = (0..self.drives.len()).filter(|&d| self.drives[d].joint == Some(joint));
@@ -199,7 +200,7 @@ impl Anatomy {
         all.next().is_none().then_some(first)
     }
 
-    /// Sites of the contacts that show something.
+    /// Sites of the contacts for which `shows` is true.
     #[must_use]
     pub fn contact_sites(&self, shows: impl Fn(&Shows) -> bool) -> Vec<String> {
         let contacts = self.machine.contacts.iter();
@@ -209,7 +210,7 @@ impl Anatomy {
             .collect()
     }
 
-    /// Geoms of a contact: the site and what touches it.
+    /// Geoms of a contact: the site, then the geoms that touch it.
     #[must_use]
     pub fn touching(&self, site: &str) -> Vec<&'static str> {
         let mut contacts = self.machine.contacts.iter();
@@ -217,14 +218,15 @@ impl Anatomy {
         contact.map_or_else(Vec::new, |c| [&[c.site], c.movers].concat())
     }
 
-    /// The same, as indices.
+    /// Indices of the geoms of a contact.
     #[must_use]
     pub fn touching_indices(&self, site: &str) -> Vec<usize> {
         let all = self.touching(site);
         all.iter().filter_map(|g| self.geom(g).ok()).collect()
     }
 
-    /// The body that a contact's friction acts on: the first free one, which carries what touches.
+    /// The body on which a contact's friction acts: the first free body, or else the first body
+    /// named like a touching geom.
     #[must_use]
     pub fn mover(&self, site: &str) -> usize {
         let movers = self.touching(site);
@@ -236,21 +238,22 @@ impl Anatomy {
             .unwrap_or(0)
     }
 
-    /// Whether it can go on for as long as one likes: all of it is held by joints, and nothing touches.
+    /// Whether the machine can move for any length of time: it has no free body and no contacts.
     #[must_use]
     pub fn is_tireless(&self) -> bool {
         let free = self.joints.iter().any(|j| j.kind == JointKind::Free);
         !free && self.machine.contacts.is_empty()
     }
 
-    /// Whether it is one free body without drives and without contacts that matter: what both engines move alike.
+    /// Whether the machine is one free body without drives and without contacts. Both engines move
+    /// such a body alike.
     #[must_use]
     pub fn is_free_flight(&self) -> bool {
         let free = self.joints.len() == 1 && self.joints[0].kind == JointKind::Free;
         free && self.bodies.len() == 2 && self.drives.is_empty() && self.machine.contacts.is_empty()
     }
 
-    /// Length of a row of readings.
+    /// Number of values in a row of readings.
     #[must_use]
     pub fn width(&self) -> usize {
         self.sensors.iter().map(|s| s.len).sum()

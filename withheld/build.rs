@@ -1,11 +1,11 @@
-//! Lets this crate's tests and examples find libmujoco when they run.
+//! Lets this crate's tests and examples find libmujoco at run time.
 //!
-//! `mujoco-rs` links the library in `MUJOCO_DYNAMIC_LINK_DIR`, but link
-//! arguments do not travel to dependent crates; the rpath is set here for this
-//! package and by the root package for the `asid` binary. Without the variable
-//! the loader's own search path decides.
+//! `mujoco-rs` links the library in `MUJOCO_DYNAMIC_LINK_DIR`, but cargo does not pass its link
+//! arguments on to dependent crates. This script therefore sets the rpath for this package; the
+//! root package sets it for the `asid` binary. Without the variable the loader's own search path
+//! decides.
 
-// A build script speaks to cargo through its standard output.
+// A build script talks to cargo through its standard output.
 #![allow(clippy::print_stdout)]
 
 use std::env;

@@ -25,43 +25,44 @@ use crate::seal::hex;
 use crate::simulate::watched;
 use rules::LeftOut;
 
-/// Logs to fit to.
+/// Number of training logs.
 const TRAIN: usize = 6;
-/// Logs held out.
+/// Number of held-out logs.
 const TEST: usize = 3;
-/// Draws of a case before it is given up.
+/// Draws of a case before the generator gives it up.
 const ATTEMPTS: u32 = 12;
-/// Draws after which a case gets another machine.
+/// Draws after which a case gets another machine of the half.
 const PATIENCE: u32 = 4;
-/// Amplitudes of a machine that hardly moves, as a share of the usual.
+/// Amplitude of a machine that hardly moves, as a share of its usual amplitude.
 const LITTLE: f64 = 0.04;
-/// Factors of a machine's rows a second.
+/// Factors of a machine's usual row rate.
 const RATES: [f64; 5] = [0.5, 1.0, 1.0, 2.0, 2.5];
-/// Range of the factors of its seconds.
+/// Range of the factor of a machine's usual episode length.
 const LENGTHS: [f64; 2] = [0.7, 1.3];
-/// Excess gap from which on its signals are told, in noise floors.
+/// Excess gap above which the label lists signals and places, in noise floors.
 const SPEAKS: f64 = 0.05;
-/// Share of the worlds of a body in free flight that rapier moves: as many as not.
+/// Share of the worlds of a body in free flight that rapier moves: one half, so that both engines
+/// are equally common.
 const BY_RAPIER: f64 = 0.5;
-/// Rest before the motion of a log whose encoder rests.
+/// Share of an episode that a machine rests before it moves, in a log with an encoder at rest.
 const REST: f64 = 0.3;
-/// Rows a second of a fast log.
+/// Rows per second of a fast log.
 const FAST: f64 = 1000.0;
-/// Rows of a long log.
+/// Rows of all logs of a case with long logs.
 const LONG: f64 = 100_000.0;
 
 /// A case, ready to be written.
 pub struct Case {
     /// Files of the study by name.
     pub study: BTreeMap<String, String>,
-    /// Its label.
+    /// Label of the case.
     pub label: Label,
 }
 
 /// Makes a case of a plan.
 ///
 /// # Errors
-/// Where a model is wrong, or no draw was usable.
+/// If a model is wrong, or if no draw is usable.
 pub fn make(plan: &Plan, seed: u64, number: usize) -> Result<Case> {
     let mut left_out: Vec<String> = Vec::new();
     for attempt in 0..ATTEMPTS {
@@ -71,7 +72,8 @@ pub fn make(plan: &Plan, seed: u64, number: usize) -> Result<Case> {
             &number.to_string(),
             &attempt.to_string(),
         ];
-        // After some draws another machine of the half, so that a set has as many cases as were asked for.
+        // After `PATIENCE` draws the case gets another machine of the half, so that the set has as
+        // many cases as were asked for.
         let slot = &plan.slots[number];
         let other = attempt.saturating_sub(PATIENCE) as usize;
         let machine = (slot.machine + other) % plan.machines.len();
@@ -90,7 +92,8 @@ pub fn make(plan: &Plan, seed: u64, number: usize) -> Result<Case> {
         if other > 0 {
             draw.other_causes();
         }
-        // What falls, flies or slides away does so within its usual time.
+        // A machine that falls, flies or slides away does so within its usual time, so its log
+        // cannot be long.
         if draw.slot.fault == Some(LogFault::Long) && !draw.anatomy.is_tireless() {
             draw.slot.fault = Some(LogFault::Fast);
         }
@@ -116,9 +119,9 @@ struct Draw<'a> {
     anatomy: &'a Anatomy,
     slot: Slot,
     random: ChaCha8Rng,
-    /// Levels below the planned one.
+    /// Number of levels below the planned one.
     lower: usize,
-    /// Factors of the machine's rows a second and of its seconds.
+    /// Factors of the machine's row rate and of its episode length.
     pace: [f64; 2],
 }
 
@@ -137,7 +140,7 @@ impl Draw<'_> {
         let (timestep, integrator) = self.world_step();
         let motions = self.motions(self.usual());
         let bench = Bench::new(anatomy, &truth, &motions, timestep, integrator)?;
-        // The cheap rule first.
+        // The rule that costs least to check comes first.
         let mut integration_gap = self.integration_gap(&bench)?;
         let dirt = if self.slot.dirty {
             dirt::draw(anatomy, &bench.typical, &mut self.random)
@@ -146,7 +149,8 @@ impl Draw<'_> {
         };
         let dirt_gap = self.gap_of(&bench, &dirt)?;
         let (causes, target) = self.sized_causes(&bench, dirt_gap, left_out)?;
-        // The motions of the logs are other ones where the case is to have few, many or fast rows.
+        // If the case is to have little motion or many or fast rows, its logs have motions of their
+        // own.
         let style = self.style();
         let usual = style == self.usual();
         let own = if usual {
@@ -205,7 +209,9 @@ impl Draw<'_> {
         Ok(Case { study, label })
     }
 
-    /// Time step and integrator of the world: never those of the study together. What flies freely may be moved by rapier.
+    /// Time step and integrator of the world. The time step is always finer than the study's.
+    ///
+    /// rapier may move a body in free flight.
     fn world_step(&mut self) -> (f64, &'static str) {
         let finer = [2.0, 2.0, 4.0][self.random.random_range(0..3)];
         let integrators = ["implicitfast", "implicit", "Euler"];

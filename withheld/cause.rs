@@ -1,28 +1,28 @@
-//! What a cause is: something that the study's model lacks, at a place, of a size.
+//! What a cause is: a physical effect that the study's model lacks, with a site and a size.
 
 use crate::anatomy::{Anatomy, Drive, DriveKind, Joint, JointKind};
 use crate::simulate::Typical;
 use crate::world::{ReadingPath, World};
 
-/// Where a cause stands with respect to the catalogue of effects.
+/// Relation of a cause to the catalogue of effects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// An effect of the catalogue.
     Catalogue,
-    /// An effect whose name is agreed on; a diagnosis may not have it yet.
+    /// An effect with an agreed name that a diagnosis may not have in its catalogue yet.
     Agreed,
-    /// In no catalogue; the name begins with `unknown:`.
+    /// An effect of no catalogue; its name begins with `unknown:`.
     Unknown,
 }
 
 /// True values of an effect's parameters, by the catalogue's names.
 pub type Values = Vec<(&'static str, f64)>;
 
-/// A cause; one file each.
+/// A cause. Each has a file of its own.
 pub trait Cause: Sync {
-    /// The effect's name, or `unknown:` and a name.
+    /// Name of the effect, or `unknown:` and a name.
     fn name(&self) -> &'static str;
-    /// Where it stands.
+    /// Relation to the catalogue of effects.
     fn standing(&self) -> Standing {
         if self.name().starts_with("unknown:") {
             Standing::Unknown
@@ -30,41 +30,42 @@ pub trait Cause: Sync {
             Standing::Catalogue
         }
     }
-    /// The elements of a machine that it can act on; an empty name for the whole machine.
+    /// Elements of a machine on which it can act; an empty name stands for the whole machine.
     fn sites(&self, machine: &Anatomy) -> Vec<String>;
-    /// Largest size that is tried, in the unit of the cause's main parameter. Size 0 is off.
+    /// Largest size that the generator tries, in the unit of the cause's main parameter. At size 0
+    /// the cause is off.
     fn largest(&self, place: &Place<'_>) -> f64;
-    /// Adds the cause to a world.
+    /// Adds the cause to a world; returns the true values of its parameters.
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values;
 }
 
-/// A cause's place, and what is drawn once for it.
+/// The site of a cause, and the random numbers that are drawn once for it.
 #[derive(Clone, Copy, Debug)]
 pub struct Place<'a> {
     /// The machine.
     pub machine: &'a Anatomy,
-    /// What it typically does without the cause.
+    /// Typical motion and forces of the machine without the cause.
     pub typical: &'a Typical,
-    /// The element.
+    /// Name of the element.
     pub site: &'a str,
-    /// Uniform numbers in 0 to 1 for what is not the size: signs, angles, places.
+    /// Uniform numbers in 0 to 1 for everything but the size: signs, angles, positions.
     pub draw: [f64; 4],
 }
 
 impl<'a> Place<'a> {
-    /// 1 or -1.
+    /// Sign of a draw: 1 or -1.
     #[must_use]
     pub fn sign(&self, which: usize) -> f64 {
         if self.draw[which] < 0.5 { -1.0 } else { 1.0 }
     }
 
-    /// A number between two.
+    /// A number between `low` and `high`, from a draw.
     #[must_use]
     pub fn between(&self, which: usize, low: f64, high: f64) -> f64 {
         low + (high - low) * self.draw[which]
     }
 
-    /// What something is multiplied by: `1 + size` or its inverse, by the first sign.
+    /// Factor of a multiplied quantity: `1 + size` or its inverse, by the first sign.
     #[must_use]
     pub fn factor(&self, size: f64) -> f64 {
         if self.sign(0) > 0.0 {
@@ -74,7 +75,7 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// Multiplies a number of an attribute of all geoms of the site's contact.
+    /// Multiplies one value of an attribute of all geoms of the site's contact.
     pub fn scale_contact(
         &self,
         size: f64,
@@ -99,8 +100,10 @@ impl<'a> Place<'a> {
         vec![("factor", factor)]
     }
 
-    /// Distorts each column of the site's sensor: a number, called `name`, with a drawn sign, a vector
-    /// along a drawn direction, called by its axes.
+    /// Distorts each column of the site's sensor. Returns the values of the parameters.
+    ///
+    /// A scalar gets a drawn sign, and its parameter is called `name`. A vector is distorted along
+    /// a drawn direction, and its parameters are called by its axes.
     pub fn along_columns(
         &self,
         size: f64,
@@ -127,7 +130,7 @@ impl<'a> Place<'a> {
         values
     }
 
-    /// Index of the joint that the site is, or that the site's actuator drives.
+    /// Index of the joint that is the site, or that the site's actuator drives.
     #[must_use]
     pub fn joint_index(&self) -> usize {
         let machine = self.machine;
@@ -138,13 +141,13 @@ impl<'a> Place<'a> {
             .unwrap_or(0)
     }
 
-    /// That joint.
+    /// The joint that is the site, or that the site's actuator drives.
     #[must_use]
     pub fn joint(&self) -> &'a Joint {
         &self.machine.joints[self.joint_index()]
     }
 
-    /// Index of the actuator that the site is, or that drives the site's joint.
+    /// Index of the actuator that is the site, or that drives the site's joint.
     #[must_use]
     pub fn drive_index(&self) -> usize {
         let machine = self.machine;
@@ -153,13 +156,13 @@ impl<'a> Place<'a> {
             .unwrap_or(0)
     }
 
-    /// That actuator.
+    /// The actuator that is the site, or that drives the site's joint.
     #[must_use]
     pub fn drive(&self) -> &'a Drive {
         &self.machine.drives[self.drive_index()]
     }
 
-    /// Places of the site's sensor in a row of readings.
+    /// Columns of the site's sensor in a row of readings.
     #[must_use]
     pub fn columns(&self) -> std::ops::Range<usize> {
         let sensor = self.machine.sensor(self.site);
@@ -182,27 +185,28 @@ impl<'a> Place<'a> {
             .max(1e-3)
     }
 
-    /// Typical departure of the actuator's command from its mean.
+    /// Standard deviation of the actuator's command.
     #[must_use]
     pub fn command(&self) -> f64 {
         self.typical.command[self.drive_index()].max(1e-6)
     }
 
-    /// Spread of the sensor's reading.
+    /// Standard deviation of the sensor's reading: the largest of its columns.
     #[must_use]
     pub fn spread(&self) -> f64 {
         let all = self.columns().map(|c| self.typical.spread[c]);
         all.fold(0.0, f64::max).max(1e-6)
     }
 
-    /// Spread of the joint's position, rad or m; at least a hundredth.
+    /// Standard deviation of the joint's position, rad or m; at least a hundredth.
     #[must_use]
     pub fn roam(&self) -> f64 {
         self.typical.roam[self.joint().qpos].max(0.01)
     }
 
-    /// Mean and spread of where a body's joints bring it along an axis of the world: those of its free joint, or
-    /// of a reading of its place.
+    /// Mean and standard deviation of a body's position along an axis of the world, m.
+    ///
+    /// They are 0 and 0.1 m for a body without a free joint.
     #[must_use]
     pub fn whereabouts(&self, body: usize, axis: usize) -> [f64; 2] {
         let name = &self.machine.bodies[body];
@@ -216,7 +220,7 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// A unit vector of space that the first three draws give.
+    /// A unit vector in space, from the first two draws.
     #[must_use]
     pub fn direction(&self) -> [f64; 3] {
         let z = 2.0 * self.draw[0] - 1.0;
@@ -225,7 +229,7 @@ impl<'a> Place<'a> {
         [flat * x, flat * y, z]
     }
 
-    /// Index of the body that the site is, or whose joint it is.
+    /// Index of the body that is the site, or whose joint is the site.
     #[must_use]
     pub fn body(&self) -> usize {
         let machine = self.machine;
@@ -235,7 +239,7 @@ impl<'a> Place<'a> {
             .unwrap_or(0)
     }
 
-    /// A unit vector of the plane, at an angle that is drawn.
+    /// A unit vector in the plane, at the angle of a draw.
     #[must_use]
     pub fn heading(&self, which: usize) -> [f64; 2] {
         let (sin, cos) = (std::f64::consts::TAU * self.draw[which]).sin_cos();
@@ -263,7 +267,7 @@ pub fn hinges(machine: &Anatomy) -> Vec<String> {
         .collect()
 }
 
-/// Names of the joints that one actuator drives.
+/// Names of the joints that exactly one actuator drives.
 #[must_use]
 pub fn driven_joints(machine: &Anatomy) -> Vec<String> {
     (0..machine.joints.len())
@@ -272,8 +276,9 @@ pub fn driven_joints(machine: &Anatomy) -> Vec<String> {
         .collect()
 }
 
-/// Names of the joints between which and the drive there can be something: a servo, or a motor
-/// whose rotor has inertia.
+/// Names of the joints that can have a transmission between drive and joint.
+///
+/// Their drive is a servo, or a motor whose rotor has inertia.
 #[must_use]
 pub fn geared_joints(machine: &Anatomy) -> Vec<String> {
     (0..machine.joints.len())
@@ -292,7 +297,7 @@ pub fn drives(machine: &Anatomy) -> Vec<String> {
     machine.drives.iter().map(|d| d.name.clone()).collect()
 }
 
-/// Names of the actuators of a single joint.
+/// Names of the actuators that drive a single joint.
 #[must_use]
 pub fn joint_drives(machine: &Anatomy) -> Vec<String> {
     let drives = machine.drives.iter();
@@ -302,7 +307,7 @@ pub fn joint_drives(machine: &Anatomy) -> Vec<String> {
         .collect()
 }
 
-/// Names of the sensors that read numbers.
+/// Names of the sensors whose readings are numbers.
 #[must_use]
 pub fn sensors(machine: &Anatomy) -> Vec<String> {
     let sensors = machine.sensors.iter();

@@ -1,4 +1,4 @@
-//! Dirt: what is a little off at every machine, all at once.
+//! Dirt: the small deviations that every real machine has, all at once.
 
 use rand::Rng;
 
@@ -9,31 +9,32 @@ use crate::random::normal;
 use crate::simulate::Typical;
 use crate::world::World;
 
-/// Deviation of masses and of moments of inertia, as a share.
+/// Standard deviation of masses and of moments of inertia, as a share.
 const MASS: f64 = 0.03;
-/// Deviation of lengths, m.
+/// Standard deviation of lengths, m.
 const LENGTH: f64 = 0.001;
-/// Deviation of axes, rad: half a degree.
+/// Standard deviation of axes, rad: half a degree.
 const AXIS: f64 = 0.0087;
-/// Deviation of a joint's friction, as a share of what it is.
+/// Standard deviation of a joint's friction, as a share of its friction.
 const FRICTION: f64 = 0.1;
-/// Delay of commands, s.
+/// Range of the delay of commands, s.
 const DELAY: [f64; 2] = [0.001, 0.002];
-/// Steps of the encoders, in deviations of their noise.
+/// Range of the encoders' quantisation steps, in standard deviations of their noise.
 const STEP: [f64; 2] = [0.5, 2.0];
-/// Twist of a drive under its typical force, in deviations of its sensor's noise.
+/// Range of the twist of a drive under its typical force, in standard deviations of its sensor's
+/// noise.
 const TWIST: [f64; 2] = [0.3, 1.5];
 
-/// One item.
+/// One item of dirt, or one cause of a case.
 #[derive(Clone)]
 pub struct Item {
-    /// What it is.
+    /// Its cause.
     pub cause: &'static dyn Cause,
-    /// Where.
+    /// Its site.
     pub site: String,
-    /// How much; with a sign where the cause has one.
+    /// Its size; signed if the cause has a sign.
     pub size: f64,
-    /// What is drawn beside the size.
+    /// Random numbers for everything but the size.
     pub draw: [f64; 4],
 }
 
@@ -49,14 +50,14 @@ impl Item {
         self.cause.act(&place, self.size, world)
     }
 
-    /// `NAME@SITE`, or the name alone for the whole machine.
+    /// `NAME@SITE`, or the name alone if the site is the whole machine.
     #[must_use]
     pub fn label(&self) -> String {
         label(self.cause, &self.site)
     }
 }
 
-/// `NAME@SITE`, or the name alone for the whole machine.
+/// `NAME@SITE`, or the name alone if the site is the whole machine.
 #[must_use]
 pub fn label(cause: &dyn Cause, site: &str) -> String {
     if site.is_empty() {
@@ -66,7 +67,7 @@ pub fn label(cause: &dyn Cause, site: &str) -> String {
     }
 }
 
-/// Draws what is off at a machine.
+/// Draws the small deviations of a machine.
 pub fn draw(machine: &Anatomy, typical: &Typical, random: &mut impl Rng) -> Vec<Item> {
     let mut items = Vec::new();
     let mut add = |name: &str, site: &str, size: f64, draw: [f64; 4]| {
@@ -81,7 +82,7 @@ pub fn draw(machine: &Anatomy, typical: &Typical, random: &mut impl Rng) -> Vec<
         }
     };
     let jointed = causes::named("geometry").map_or_else(Vec::new, |c| c.sites(machine));
-    // Positive draws make sizes with a sign grow.
+    // With these draws a signed size increases the value.
     let up = [1.0; 4];
     for body in moving_bodies(machine) {
         add("mass", &body, MASS * normal(random), up);
@@ -99,7 +100,7 @@ pub fn draw(machine: &Anatomy, typical: &Typical, random: &mut impl Rng) -> Vec<
         let viscous = FRICTION * joint.damping * normal(random);
         add("viscous-friction", &joint.name, viscous, up);
         let dry = FRICTION * joint.damping * typical.speed[joint.dof] * normal(random).abs();
-        // No offset.
+        // These draws give no offset.
         add("coulomb-friction", &joint.name, dry, [0.0; 4]);
     }
     let delay = random.random_range(DELAY[0]..DELAY[1]);

@@ -1,8 +1,8 @@
 //! An MJCF document as a tree that can be edited and written again.
 //!
-//! A world differs from its study's model in attributes of the text: MuJoCo then compiles the
-//! edited text as it compiles any model, so that none of its shortcuts (bodies whose centre and axes are
-//! those of the frame) is decided by the model before the edit.
+//! A world differs from its study's model in attributes of the text. MuJoCo compiles the edited
+//! text as it compiles any model. MuJoCo has shortcuts for bodies whose centre and axes are those
+//! of the frame; none of them is thus chosen from the model before the edit.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ pub struct Element {
     pub tag: String,
     /// Attributes.
     pub attributes: Vec<(String, String)>,
-    /// Elements inside.
+    /// Child elements.
     pub children: Vec<Element>,
 }
 
@@ -31,7 +31,7 @@ impl Element {
     /// Reads a document.
     ///
     /// # Errors
-    /// The parser's message where the text is not XML.
+    /// Returns the parser's message if the text is not XML.
     pub fn parse(text: &str) -> Result<Self, String> {
         let document = roxmltree::Document::parse(text).map_err(|e| e.to_string())?;
         Ok(Self::from_node(document.root_element()))
@@ -81,14 +81,14 @@ impl Element {
         let _ = writeln!(out, "{indent}</{}>", self.tag);
     }
 
-    /// An attribute.
+    /// The text of an attribute.
     #[must_use]
     pub fn get(&self, attribute: &str) -> Option<&str> {
         let mut all = self.attributes.iter();
         all.find(|(n, _)| n == attribute).map(|(_, v)| v.as_str())
     }
 
-    /// An attribute's numbers; empty where it is not there.
+    /// The numbers of an attribute; empty if the attribute is missing.
     #[must_use]
     pub fn numbers(&self, attribute: &str) -> Vec<f64> {
         let text = self.get(attribute).unwrap_or_default();
@@ -97,7 +97,7 @@ impl Element {
             .collect()
     }
 
-    /// An attribute's first number.
+    /// The first number of an attribute.
     #[must_use]
     pub fn number(&self, attribute: &str) -> Option<f64> {
         self.numbers(attribute).first().copied()
@@ -112,13 +112,13 @@ impl Element {
         }
     }
 
-    /// Writes an attribute's numbers, each so that it is read back to the bit.
+    /// Writes the numbers of an attribute so that reading them back gives the same bits.
     pub fn set_numbers(&mut self, attribute: &str, values: &[f64]) {
         let words: Vec<String> = values.iter().map(f64::to_string).collect();
         self.set(attribute, words.join(" "));
     }
 
-    /// The first element of a tag, itself included; of that name, where one is given.
+    /// The first element of a tag, this element included; the name must match if one is given.
     #[must_use]
     pub fn find(&self, tag: &str, name: Option<&str>) -> Option<&Self> {
         if self.is(tag, name) {
@@ -127,7 +127,7 @@ impl Element {
         self.children.iter().find_map(|c| c.find(tag, name))
     }
 
-    /// The same, to be changed.
+    /// Mutable version of [`Self::find`].
     pub fn find_mut(&mut self, tag: &str, name: Option<&str>) -> Option<&mut Self> {
         if self.is(tag, name) {
             return Some(self);
@@ -135,7 +135,7 @@ impl Element {
         self.children.iter_mut().find_map(|c| c.find_mut(tag, name))
     }
 
-    /// The first element inside of the element `section`, whatever its tag, of that name.
+    /// The first element named `name` inside the element `section`, whatever its tag.
     pub fn find_in_mut(&mut self, section: &str, name: &str) -> Option<&mut Self> {
         let inside = self.find_mut(section, None)?;
         let mut all = inside.children.iter_mut();
@@ -146,7 +146,8 @@ impl Element {
         self.tag == tag && (name.is_none() || self.get("name") == name)
     }
 
-    /// Calls `visit` on this element and all inside, each with the name of the body it is in.
+    /// Calls `visit` on this element and all descendants, each with the name of the body that
+    /// contains it.
     pub fn walk<'a>(&'a self, visit: &mut dyn FnMut(&'a Self, &'a str)) {
         self.walk_in("world", visit);
     }

@@ -1,8 +1,9 @@
-//! MuJoCo, one simulation at a time: the only module with pointers behind it. A free body can be moved by rapier instead.
+//! Runs MuJoCo, one simulation at a time. This is the crate's only module that uses pointers.
 //!
-//! A step is taken in MuJoCo's two halves: after the first, positions, velocities and readings are
-//! those of the state before the step; forces written by hand go in between, so that a law of position
-//! and speed is evaluated at the state it belongs to.
+//! rapier can move a free body instead. A step is taken in MuJoCo's two halves. After the first
+//! half, positions, velocities and readings are those of the state before the step. Forces written
+//! by hand are added between the halves, so that a law of position and speed is evaluated at the
+//! state to which it belongs.
 
 // The model of a running simulation can only be changed through an unsafe accessor.
 #![allow(unsafe_code)]
@@ -15,7 +16,7 @@ use mujoco_rs::mujoco_c::{mjLogMessage, mju_setLogHandler};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 
-/// What takes a world's steps in place of an integrator of MuJoCo's.
+/// Name of the engine that takes a world's steps in place of an integrator of MuJoCo.
 pub const RAPIER: &str = "rapier";
 
 /// State beyond which a simulation has diverged, SI units. MuJoCo itself calls 1e10 huge.
@@ -29,7 +30,7 @@ fn silence() {
         let Some(message) = (unsafe { message.as_ref() }) else {
             return;
         };
-        // The C library allows no return from an error.
+        // The C library does not allow a return from an error.
         assert!(
             message.level() != mujoco_rs::mujoco_c::mjtLogLevel::mjLOG_ERROR,
             "MuJoCo stopped: {}",
@@ -45,7 +46,7 @@ fn silence() {
 /// Compiles a document.
 ///
 /// # Errors
-/// MuJoCo's message, in one line.
+/// Returns MuJoCo's message, in one line.
 pub fn compile(text: &str) -> Result<MjModel, String> {
     silence();
     MjModel::from_xml_string(text).map_err(|e| {
@@ -60,7 +61,7 @@ pub fn index(model: &MjModel, kind: MjtObjBase, name: &str) -> Option<usize> {
     model.name_to_id(kind, name)
 }
 
-/// Names of all elements of a kind, in order; empty where one has none.
+/// Names of all elements of a kind, in order; an element without a name has an empty one.
 #[must_use]
 pub fn names(model: &MjModel, kind: MjtObjBase, count: i64) -> Vec<String> {
     (0..usize::try_from(count).unwrap_or(0))
@@ -71,9 +72,9 @@ pub fn names(model: &MjModel, kind: MjtObjBase, count: i64) -> Vec<String> {
 /// A running simulation.
 pub struct Sim {
     data: MjData<Box<MjModel>>,
-    /// What moves it, where that is not MuJoCo.
+    /// The body in rapier, if rapier moves it.
     mover: Option<rapier::Mover>,
-    /// Whether rapier is to move it.
+    /// Whether rapier moves it.
     by_rapier: bool,
     /// Time step, s.
     pub dt: f64,
@@ -81,16 +82,18 @@ pub struct Sim {
     pub time: f64,
     /// Number of the episode, from 0.
     pub episode: usize,
-    /// Dry friction of each joint, and sliding friction of each geom, as the model has them.
+    /// Dry friction of each degree of freedom in the model; the next field holds each geom's
+    /// sliding friction.
     dry_base: Vec<f64>,
     sliding_base: Vec<f64>,
-    /// What the present step adds to the one and multiplies the other with.
+    /// What the present step adds to the dry friction; the next field holds its factors of the
+    /// sliding friction.
     dry_extra: Vec<f64>,
     sliding_factor: Vec<f64>,
 }
 
 impl Sim {
-    /// A simulation of a compiled model, whose only body is free where `by_rapier`.
+    /// A simulation of a compiled model. With `by_rapier` its only body must be free.
     #[must_use]
     pub fn new(model: MjModel, by_rapier: bool) -> Self {
         let sliding = model.geom_friction().iter().map(|f| f[0]);
@@ -108,7 +111,7 @@ impl Sim {
         }
     }
 
-    /// Begins an episode at a state.
+    /// Begins an episode at an initial state.
     pub fn begin(&mut self, episode: usize, qpos: &[f64], qvel: &[f64]) {
         self.data.reset();
         self.data.qpos_mut().copy_from_slice(qpos);
@@ -120,7 +123,7 @@ impl Sim {
         self.mover = self.by_rapier.then(new);
     }
 
-    /// First half of a step: what follows from position and velocity.
+    /// Takes the first half of a step: computes everything that follows from position and velocity.
     pub fn observe(&mut self) {
         self.set_coefficients();
         self.data.step1();
@@ -128,7 +131,9 @@ impl Sim {
         self.data.xfrc_applied_mut().fill([0.0; 6]);
     }
 
-    /// Second half: forces, and the state after the step. False where it left all bounds.
+    /// Takes the second half of a step: forces, and the state after the step.
+    ///
+    /// Returns `false` if the simulation has diverged.
     pub fn advance(&mut self) -> bool {
         match &mut self.mover {
             None => self.data.step2(),
@@ -155,7 +160,7 @@ impl Sim {
         self.data.qvel()
     }
 
-    /// Commands, to be written.
+    /// Commands, writable.
     pub fn ctrl(&mut self) -> &mut [f64] {
         self.data.ctrl_mut()
     }
@@ -166,7 +171,7 @@ impl Sim {
         self.data.sensordata()
     }
 
-    /// Forces of the actuators on the joints, of the last whole step.
+    /// Generalised forces of the actuators in the last complete step.
     #[must_use]
     pub fn drive_forces(&self) -> &[f64] {
         self.data.qfrc_actuator()
@@ -178,7 +183,7 @@ impl Sim {
         self.data.qfrc_bias()
     }
 
-    /// Inertia that a joint moves, the others held: an entry of the diagonal of the mass matrix.
+    /// Inertia that a joint moves while the others are held: a diagonal entry of the mass matrix.
     #[must_use]
     pub fn inertia(&self, dof: usize) -> f64 {
         let nv = self.data.qvel().len();
@@ -189,7 +194,7 @@ impl Sim {
         }
     }
 
-    /// Adds a generalized force, N or N m.
+    /// Adds a generalised force, N or N m.
     pub fn push_joint(&mut self, dof: usize, force: f64) {
         self.data.qfrc_applied_mut()[dof] += force;
     }
@@ -219,13 +224,14 @@ impl Sim {
         ([v[0], v[1], v[2]], [v[3], v[4], v[5]])
     }
 
-    /// Centre of mass of a body, world frame, m.
+    /// Centre of mass of a body in the world's frame, m.
     #[must_use]
     pub fn body_position(&self, body: usize) -> [f64; 3] {
         self.data.xipos()[body]
     }
 
-    /// Whether an actuator is at a limit of its command, or was at one of its force in the last step.
+    /// Whether an actuator's command is at its limit, or its force was at its limit in the last
+    /// step.
     #[must_use]
     pub fn saturated(&self, drive: usize) -> bool {
         let model = self.model();
@@ -241,7 +247,8 @@ impl Sim {
         )
     }
 
-    /// The body that a body pressed on most in the last step, among those that move where there is one.
+    /// The body on which a body pressed hardest in the last step. Moving bodies take precedence
+    /// over fixed ones.
     #[must_use]
     pub fn touches(&self, body: usize) -> Option<usize> {
         let model = self.model();
@@ -254,14 +261,14 @@ impl Sim {
             let [Ok(a), Ok(b)] = [a, b].map(usize::try_from) else {
                 continue;
             };
-            // Contacts that exert nothing have no row among the constraints.
+            // Contacts without force have no row among the constraints.
             if (a != body && b != body) || contact.efc_address < 0 {
                 continue;
             }
             let other = if a == body { b } else { a };
             let force = match self.mover {
                 None => self.data.contact_force(i)[0],
-                // MuJoCo knows how deep, and not how hard.
+                // For a body moved by rapier, MuJoCo knows the penetration depth but not the force.
                 Some(_) => -contact.dist,
             };
             let moves = model.body_weldid()[other] != 0;
@@ -279,7 +286,7 @@ impl Sim {
         self.data.model()
     }
 
-    /// Adds to the dry friction of a joint during the next step, N or N m.
+    /// Adds to the dry friction of a degree of freedom during the next step, N or N m.
     pub fn add_dry_friction(&mut self, dof: usize, force: f64) {
         self.dry_extra[dof] += force;
     }
@@ -289,9 +296,9 @@ impl Sim {
         self.sliding_factor[geom] *= factor;
     }
 
-    /// Writes the coefficients of the next step into the model, and forgets them.
+    /// Writes the coefficients of the next step into the model and resets them.
     fn set_coefficients(&mut self) {
-        // SAFETY: numbers of the model change; no size and no index does.
+        // SAFETY: only numbers of the model change; no size and no index changes.
         let model = unsafe { self.data.model_mut() };
         let dry = model.dof_frictionloss_mut().iter_mut();
         for ((to, base), extra) in dry.zip(&self.dry_base).zip(&mut self.dry_extra) {

@@ -1,4 +1,4 @@
-//! What can go wrong while cases are made.
+//! Errors of the generator.
 
 use std::path::PathBuf;
 
@@ -13,23 +13,23 @@ pub enum Error {
         /// MuJoCo's message, in one line.
         message: String,
     },
-    /// A model that others wrote cannot be a machine.
+    /// A model of other authors cannot become a machine.
     #[error("cannot be a machine: {why}")]
     Unfit {
-        /// Which element is in the way, and why.
+        /// The unsupported element, and the reason.
         why: String,
     },
-    /// A model has no such element.
+    /// A model lacks an element.
     #[error("machine `{machine}` has no {element} `{name}`")]
     Element {
         /// Name of the machine.
         machine: String,
         /// Tag of the element.
         element: String,
-        /// Name that was looked for.
+        /// Name of the missing element.
         name: String,
     },
-    /// A simulation left all bounds.
+    /// A simulation diverged.
     #[error("a simulation of `{machine}` diverged at {time:.3} s")]
     Diverged {
         /// Name of the machine.
@@ -44,13 +44,13 @@ pub enum Error {
         case: usize,
         /// Draws tried.
         attempts: u32,
-        /// Why the last one was left out.
+        /// Reason for which the last draw was left out.
         reason: String,
     },
-    /// A set is asked for that cannot be.
+    /// The requested set cannot exist.
     #[error("{message}")]
     Wanted {
-        /// What there is none of.
+        /// What the half does not have.
         message: String,
     },
     /// A file cannot be written or read.
@@ -58,7 +58,7 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Reason.
         message: String,
     },
 }

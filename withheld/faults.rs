@@ -1,4 +1,4 @@
-//! Faults of a log, and of the wiring of its columns.
+//! Faults of a log and of the wiring of its columns.
 
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -10,24 +10,24 @@ use crate::anatomy::Anatomy;
 pub enum LogFault {
     /// Two of three readings are missing.
     Missing,
-    /// The first sensor reads in steps and without noise, and the machine rests at first.
+    /// The first sensor reads in quantisation steps without noise, and the machine rests at first.
     Encoder,
     /// The noise is strongly correlated from row to row.
     FilteredNoise,
-    /// Rows are read at other times than their stamps say.
+    /// Rows are read at times that differ from their stamps.
     Jitter,
     /// A few readings are far off.
     Spikes,
-    /// No row holds the state.
+    /// No row holds the initial state.
     NoStart,
-    /// A thousand rows a second.
+    /// The log has 1000 rows per second.
     Fast,
-    /// A hundred thousand rows.
+    /// The log is long: all logs of the case have 100,000 rows together.
     Long,
 }
 
 impl LogFault {
-    /// All of them.
+    /// All faults of a log.
     pub const ALL: [Self; 8] = [
         Self::Missing,
         Self::Encoder,
@@ -62,16 +62,16 @@ pub enum WiringKind {
     Swapped,
     /// A column has the wrong sign.
     Sign,
-    /// A column is in degrees, or in millimetres.
+    /// A column is in degrees or in millimetres.
     Unit,
-    /// A column is shifted.
+    /// A column is shifted by a constant.
     Offset,
-    /// Readings are late against commands.
+    /// Readings lag behind commands.
     Clock,
 }
 
 impl WiringKind {
-    /// All of them.
+    /// All kinds of wiring faults.
     pub const ALL: [Self; 5] = [
         Self::Swapped,
         Self::Sign,
@@ -93,20 +93,20 @@ impl WiringKind {
     }
 }
 
-/// What is wrong with the logs of a whole set.
+/// The fault of all logs of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Fault {
     /// Nothing.
     Nothing,
-    /// The logs themselves.
+    /// A fault of the logs themselves.
     Log(LogFault),
-    /// Their wiring.
+    /// A fault of their wiring.
     Wiring(WiringKind),
 }
 
 impl Fault {
-    /// All of them.
+    /// All faults, and `Nothing`.
     pub fn all() -> impl Iterator<Item = Self> {
         let logs = LogFault::ALL.into_iter().map(Self::Log);
         let wiring = WiringKind::ALL.into_iter().map(Self::Wiring);
@@ -123,7 +123,7 @@ impl Fault {
         }
     }
 
-    /// The fault of a name.
+    /// The fault of that name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::all().find(|fault| fault.name() == name)
@@ -144,26 +144,26 @@ impl From<Fault> for String {
     }
 }
 
-/// A wiring fault at its columns.
+/// A wiring fault and its columns.
 #[derive(Clone, Debug)]
 pub struct Wiring {
-    /// `wiring-swapped` and so on.
+    /// Name of the fault, for example `wiring-swapped`.
     pub fault: &'static str,
     /// Names of the columns.
     pub columns: Vec<String>,
-    /// Factor, shift or delay in SI units; 0 where there is none.
+    /// Factor, shift or delay in SI units; 0 if the fault has none.
     pub value: f64,
-    /// Places of the columns in a row of readings.
+    /// Indices of the columns in a row of readings.
     at: Vec<usize>,
 }
 
-/// Shift of a column, in spreads of its reading.
+/// Range of the shift of a column, in standard deviations of its reading.
 const SHIFT: [f64; 2] = [0.5, 1.5];
-/// Delay of readings against commands, s.
+/// Range of the delay of readings against commands, s.
 const CLOCK: [f64; 2] = [0.03, 0.12];
 
 impl Wiring {
-    /// Draws a fault of a kind; `None` where the machine has no columns for it.
+    /// Draws a fault of a kind; `None` if the machine has no columns for it.
     pub fn draw(
         kind: WiringKind,
         anatomy: &Anatomy,
@@ -232,7 +232,7 @@ impl Wiring {
         })
     }
 
-    /// How late readings are, s.
+    /// Delay of the readings, s.
     #[must_use]
     pub fn clock(&self) -> f64 {
         if self.fault == WiringKind::Clock.name() {
@@ -242,7 +242,7 @@ impl Wiring {
         }
     }
 
-    /// Does to the readings what the fault does.
+    /// Applies the fault to the columns' names and readings.
     pub fn apply(&self, _commands: &mut [String], sensors: &mut [String], rows: &mut [Vec<f64>]) {
         match (self.fault, &self.at[..]) {
             ("wiring-swapped", &[a, b]) => sensors.swap(a, b),

@@ -1,10 +1,11 @@
-//! How far a world is from the study's model: the excess gap.
+//! The excess gap: how far a world is from the study's model.
 //!
-//! The excess gap of a world is the root mean square, over all readings of all episodes, of the
-//! difference between its readings without noise and those of the study's model, each in units of its sensor's
-//! noise, *after the study's parameters were refitted*: what a parameter absorbs is no gap. The model is run at
-//! the world's own time step here, so that the gap is of physics and not of integration, which is measured apart.
-//! With white noise the gap that a diagnosis sees is `sqrt(1 + excess²)`.
+//! The excess gap is the root mean square difference between a world's readings without noise and
+//! those of the study's model. It runs over all readings of all episodes; each difference is in
+//! units of its sensor's noise. The study's parameters are *refitted* first, so what a parameter
+//! absorbs is no gap. The model runs at the world's own time step here, so that the gap is one of
+//! physics and not of integration. The gap of integration is measured separately. With white noise
+//! the gap that a diagnosis sees is `sqrt(1 + excess²)`.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,12 +17,12 @@ use crate::world::World;
 
 /// Step of a finite difference, as a share of a parameter's range.
 const STEP: f64 = 0.01;
-/// Rounds of the refit by replays (Gauss and Newton, the Jacobian kept).
+/// Gauss-Newton iterations of the refit by replays; the Jacobian is computed once.
 const ROUNDS: usize = 3;
-/// A round that shrinks the gap by less than this share is the last.
+/// The refit ends after an iteration that reduces the gap by less than this share.
 const ENOUGH: f64 = 0.02;
 
-/// The episodes of a case, and the machine without a cause in them.
+/// The episodes of a case, and the machine's readings in them without a cause.
 pub struct Bench<'a> {
     /// The machine.
     pub anatomy: &'a Anatomy,
@@ -35,20 +36,20 @@ pub struct Bench<'a> {
     pub integrator: &'static str,
     /// Readings without a cause, in units of the noise.
     pub clean: Vec<f64>,
-    /// What the machine typically does without one.
+    /// Typical motion and forces of the machine without a cause.
     pub typical: Typical,
-    /// Orthonormal basis of what the parameters change, and the upper triangle that it goes with.
+    /// QR decomposition of the Jacobian of the readings with respect to the parameters: Q and R.
     basis: Option<(DMatrix<f64>, DMatrix<f64>)>,
 }
 
-/// A refit.
+/// Result of a refit.
 #[derive(Clone, Debug)]
 pub struct Refit {
     /// Values of the parameters.
     pub values: Vec<f64>,
-    /// Excess gap with them.
+    /// Excess gap at these values.
     pub excess: f64,
-    /// What is left of each reading, in units of the noise.
+    /// Residual of each reading, in units of the noise.
     pub residual: Vec<f64>,
 }
 
@@ -56,7 +57,7 @@ impl<'a> Bench<'a> {
     /// Runs the machine without a cause, and once more for each parameter.
     ///
     /// # Errors
-    /// Where a simulation fails.
+    /// If a simulation fails.
     pub fn new(
         anatomy: &'a Anatomy,
         truth: &[f64],
@@ -100,10 +101,10 @@ impl<'a> Bench<'a> {
         Ok(bench)
     }
 
-    /// The machine without a cause.
+    /// The machine without a cause, at these parameter values.
     ///
     /// # Errors
-    /// Where a parameter's target is not in the model.
+    /// If a parameter's target is not in the model.
     pub fn world(&self, values: &[f64]) -> Result<World> {
         World::new(self.anatomy, values, self.timestep, self.integrator)
     }
@@ -111,13 +112,15 @@ impl<'a> Bench<'a> {
     /// Readings of a world at all rows, in units of the noise.
     ///
     /// # Errors
-    /// Where the simulation fails.
+    /// If the simulation fails.
     pub fn run(&self, world: &mut World) -> Result<Vec<f64>> {
         let record = simulate(self.anatomy, world, self.motions)?;
         Ok(self.rows(&record, &world.steps))
     }
 
-    /// Readings of the first episodes of a record at their rows, in units of the noise.
+    /// Readings of a record at the rows of its episodes, in units of the noise.
+    ///
+    /// The record may hold only the first episodes.
     #[must_use]
     pub fn rows(&self, record: &Record, steps: &[(usize, f64)]) -> Vec<f64> {
         let mut rows = Vec::new();
@@ -143,7 +146,8 @@ impl<'a> Bench<'a> {
         (sum / a.len().max(1) as f64).sqrt()
     }
 
-    /// Excess gap of readings by a linear refit: what the parameters' tangents span is taken out.
+    /// Excess gap of readings after a linear refit: the span of the Jacobian's columns is projected
+    /// out.
     #[must_use]
     pub fn excess(&self, readings: &[f64]) -> f64 {
         let difference = self.difference(readings);
@@ -159,10 +163,10 @@ impl<'a> Bench<'a> {
         DVector::from_iterator(readings.len(), pairs.map(|(a, b)| a - b))
     }
 
-    /// Excess gap of readings by a refit with replays, within the parameters' ranges.
+    /// Excess gap of readings after a refit by replays, within the parameters' ranges.
     ///
     /// # Errors
-    /// Where a simulation fails.
+    /// If a simulation fails.
     pub fn refit(&self, readings: &[f64]) -> Result<Refit> {
         let mut best = Refit {
             values: self.truth.clone(),
@@ -178,7 +182,7 @@ impl<'a> Bench<'a> {
                 break;
             };
             let before = best.excess;
-            // A step that makes it worse is halved twice, then given up.
+            // A step that increases the gap is halved up to twice, then dropped.
             for shrink in [1.0, 0.5, 0.25] {
                 let parameters = self.anatomy.machine.parameters.iter();
                 let values: Vec<f64> = parameters
@@ -224,7 +228,7 @@ impl Refit {
     }
 }
 
-/// A number of a reading in the steps of its sensor, where it has some.
+/// Rounds a reading to its sensor's quantisation step, if the sensor has one.
 #[must_use]
 pub fn in_steps(value: f64, column: usize, steps: &[(usize, f64)]) -> f64 {
     let mut all = steps.iter();

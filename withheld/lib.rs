@@ -1,18 +1,22 @@
-//! Worlds whose effect is withheld: the measuring stick of the diagnosis.
+//! Generates worlds whose effect is withheld, to measure the diagnosis.
 //!
-//! A [`case`] is a study (a model, logs, what its owner fits) of a machine that differs from its model by
-//! [`causes`] that only its [`label`] names. So that nothing of the diagnosis can be inside of the stick,
-//! this crate shares no code with effects, diagnosis or tasks: it drives MuJoCo itself, edits the model's text,
-//! and writes forces and filters by hand, at another time step than the study's model.
+//! A [`case`] is a study: a model, logs, and the parameters that its owner fits. The machine
+//! differs from its model by [`causes`] that only the case's [`label`] names. The generator must
+//! not depend on what it measures. This crate therefore shares no code with effects, diagnosis or
+//! tasks. It drives MuJoCo itself, edits the model's text, and implements forces and filters by
+//! hand, at another time step than the study's model.
 //!
 //! - [`machines`]: one file each, in two halves by kind of machine.
-//! - [`outside`]: machines that others modelled.
+//! - [`outside`]: machines that other authors modelled.
 //! - [`causes`]: one file each.
 //! - [`world`], [`simulate`], [`rotor`]: a machine with causes, and its run.
-//! - [`gap`], [`size`]: how far a world is from its model, and how large a cause must be for that.
-//! - [`regime`]: in which motion it is so.
-//! - [`dirt`], [`faults`], [`log`]: what is off at every machine, and what happens to logs.
-//! - [`plan`], [`case`], [`make`], [`seal`]: which cases there are, and how they are written and sealed.
+//! - [`gap`], [`size`]: how far a world is from its model, and how large a cause must be for a
+//!   wanted gap.
+//! - [`regime`]: the regime of motion of each reading.
+//! - [`dirt`], [`faults`], [`log`]: small deviations of every machine, faults of logs, and writing
+//!   logs.
+//! - [`plan`], [`case`], [`make`], [`seal`]: which cases there are, and how they are written and
+//!   sealed.
 
 pub mod anatomy;
 pub mod case;

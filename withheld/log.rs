@@ -16,9 +16,10 @@ use crate::simulate::Record;
 pub struct Style {
     /// Correlation of a sensor's noise from one row to the next; 0 is white.
     pub colour: f64,
-    /// Deviation of the times at which rows are read from their stamps, as a share of the time between rows.
+    /// Standard deviation of the reading times about the rows' stamps, as a share of the time
+    /// between rows.
     pub jitter: f64,
-    /// Whether the first row holds the state.
+    /// Whether the first row holds the initial state.
     pub starts: bool,
     /// A fault of the log.
     pub fault: Option<LogFault>,
@@ -26,17 +27,19 @@ pub struct Style {
     pub wiring: Option<Wiring>,
 }
 
-/// Share of rows whose readings are spikes, in a log with this fault.
+/// Share of readings that are spikes, in a log with this fault.
 const SPIKES: f64 = 0.004;
-/// Size of a spike in deviations of the noise.
+/// Range of the size of a spike, in standard deviations of the noise.
 const SPIKE: [f64; 2] = [15.0, 60.0];
-/// Readings of which one is left, in a log with missing readings.
+/// One of this many readings is left, in a log with missing readings.
 const ONE_IN: usize = 3;
-/// Steps of an encoder at rest: as rough as its sensor's noise was (a uniform error of a step has a
-/// deviation of a step over the root of 12).
+/// Quantisation step of an encoder at rest, in standard deviations of its sensor's noise.
+///
+/// Its error has the same standard deviation as the noise: the uniform error of a step has the
+/// standard deviation of the step over the root of 12.
 const ENCODER: f64 = 3.464;
 
-/// One log as a text of comma-separated values.
+/// One log as comma-separated values.
 #[must_use]
 pub fn text(
     anatomy: &Anatomy,
@@ -106,7 +109,7 @@ fn digits(value: f64) -> String {
     }
 }
 
-/// Readings with noise, a row each; NaN where one is missing.
+/// Readings with noise, one row each; NaN for a missing reading.
 fn readings(
     anatomy: &Anatomy,
     record: &Record,
@@ -160,7 +163,7 @@ fn readings(
     rows
 }
 
-/// Columns of the state at the first row.
+/// Columns of the initial state in the first row.
 fn start(anatomy: &Anatomy, motion: &Motion) -> Vec<(String, f64)> {
     let mut columns = Vec::new();
     let mut add = |what: &str, joint: &str, values: &[f64]| match values {

@@ -1,12 +1,13 @@
-//! What a machine is: a model, what its owner fits, how it is driven and where it starts.
+//! Describes a machine: its model, the parameters of its owner, its commands and its initial
+//! states.
 
-/// Half of the machines that a case belongs to.
+/// The half to which a machine belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Half {
-    /// Settings and calibration of a diagnosis may be chosen on it.
+    /// The half on which settings and calibration of a diagnosis may be chosen.
     Training,
-    /// Nothing may be chosen on it.
+    /// The half on which nothing may be chosen.
     Test,
 }
 
@@ -21,62 +22,62 @@ impl Half {
     }
 }
 
-/// A parameter of the study: the owner fits it, and its true value is drawn from the range.
+/// A parameter of the study. The owner fits it; its true value is drawn from the range.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
     /// Name in the study.
     pub name: &'static str,
     /// `geom/NAME/mass` or `geom/NAME/friction/0`.
     pub target: &'static str,
-    /// Range in the study; the truth is drawn from its middle eight tenths.
+    /// Range in the study; the true value is drawn from its middle eight tenths.
     pub range: [f64; 2],
 }
 
-/// How an actuator is driven: a sum of sines of random phases about a centre.
+/// Commands of an actuator: a sum of sines with random phases about a centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
     /// Actuator.
     pub actuator: &'static str,
     /// Mean of the command, in its unit.
     pub center: f64,
-    /// Largest departure from it, in its unit.
+    /// Largest deviation from the mean, in its unit.
     pub amplitude: f64,
     /// Lowest and highest frequency, Hz.
     pub band: [f64; 2],
 }
 
-/// Where a joint starts: each coordinate within `center` plus or minus `spread`.
+/// Initial state of a joint: each coordinate is drawn within `center` plus or minus `spread`.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// Joint.
     pub joint: &'static str,
-    /// Center and spread of each position; of a free joint x, y, z and the turn about z.
+    /// Centre and spread of each position; for a free joint x, y, z and the rotation about z.
     pub position: &'static [[f64; 2]],
-    /// Center and spread of each velocity.
+    /// Centre and spread of each velocity.
     pub velocity: &'static [[f64; 2]],
 }
 
-/// A pair of geoms that touch, both of which carry the same coefficients.
+/// Geoms that touch each other and have the same contact coefficients.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact {
-    /// The geom whose name is the site of a contact's effects: the fixed one.
+    /// The fixed geom. Its name is the site of the contact's effects.
     pub site: &'static str,
-    /// The geoms that touch it.
+    /// The geoms that touch the site.
     pub movers: &'static [&'static str],
-    /// What can be seen of the contact.
+    /// The coefficients whose effect can be seen.
     pub shows: Shows,
 }
 
-/// Which coefficients of a contact act in a machine's motion.
+/// The coefficients of a contact that act in a machine's motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shows {
-    /// It slides.
+    /// Whether it slides.
     pub sliding: bool,
-    /// It spins about the normal (`condim` of 4 or more).
+    /// Whether it spins about the normal (`condim` of 4 or more).
     pub torsion: bool,
-    /// It rolls (`condim` of 6).
+    /// Whether it rolls (`condim` of 6).
     pub rolling: bool,
-    /// It is struck, so that stiffness and damping act.
+    /// Whether it is struck, so that stiffness and damping act.
     pub impact: bool,
 }
 
@@ -85,25 +86,25 @@ pub struct Shows {
 pub struct Machine {
     /// Name.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// Description in one line.
     pub about: &'static str,
-    /// Half that it belongs to.
+    /// Half to which it belongs.
     pub half: Half,
     /// The study's model: MJCF.
     pub model: &'static str,
-    /// What the owner fits.
+    /// The parameters that the owner fits.
     pub parameters: &'static [Parameter],
     /// Standard deviation of each sensor's noise, in its unit; rad for an orientation.
     pub noise: &'static [(&'static str, f64)],
-    /// How it is driven.
+    /// Commands of its actuators.
     pub commands: &'static [Command],
-    /// Where it starts; joints that are not listed start at the model's reference at rest.
+    /// Initial states. A joint that is not listed starts at the model's reference, at rest.
     pub starts: &'static [Start],
-    /// What touches what.
+    /// Contacts.
     pub contacts: &'static [Contact],
     /// Length of an episode, s.
     pub seconds: f64,
-    /// Rows a second.
+    /// Rows per second.
     pub rate: f64,
 }
 
@@ -117,7 +118,7 @@ pub const fn fit(name: &'static str, target: &'static str, low: f64, high: f64) 
     }
 }
 
-/// A command about `center`, by at most `amplitude`, in a band of frequencies in Hz.
+/// A command about `center` by at most `amplitude`, in a band of frequencies in Hz.
 #[must_use]
 pub const fn sines(
     actuator: &'static str,
@@ -134,7 +135,7 @@ pub const fn sines(
     }
 }
 
-/// Where a joint starts: centres and spreads.
+/// Initial state of a joint: centres and spreads.
 #[must_use]
 pub const fn start(
     joint: &'static str,

@@ -1,4 +1,4 @@
-//! One episode's plan: where the machine starts and what it is told.
+//! The plan of one episode: its initial state and its commands.
 
 use rand::Rng;
 use std::f64::consts::TAU;
@@ -6,36 +6,36 @@ use std::f64::consts::TAU;
 use crate::anatomy::{Anatomy, JointKind};
 use crate::machine::Command;
 
-/// Sines that a command is the sum of.
+/// Number of sines in a command.
 const SINES: usize = 5;
-/// Time over which a command leaves its centre, s: a servo is not told to jump.
+/// Time over which a command fades in from its centre, s, so that a servo does not get a jump.
 const FADE: f64 = 0.15;
 
 /// A planned episode.
 #[derive(Clone, Debug)]
 pub struct Motion {
-    /// Position at the start.
+    /// Initial position.
     pub qpos: Vec<f64>,
-    /// Velocity at the start.
+    /// Initial velocity.
     pub qvel: Vec<f64>,
-    /// Commands, rows x actuators, each held for a row.
+    /// Commands, rows x actuators, each held for one row.
     pub commands: Vec<f64>,
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
     /// Time between rows, s.
     pub period: f64,
 }
 
-/// How episodes of a case are planned.
+/// How the episodes of a case are planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     /// Length, s.
     pub seconds: f64,
-    /// Rows a second.
+    /// Rows per second.
     pub rate: f64,
-    /// Factor of all amplitudes and spreads: 1, or less where a case is to have too little excitation.
+    /// Factor of all amplitudes and spreads: 1, or less for a case with too little excitation.
     pub vigour: f64,
-    /// Share of the episode at the beginning during which commands rest.
+    /// Initial share of the episode during which commands rest.
     pub rest: f64,
 }
 
@@ -61,7 +61,8 @@ impl Motion {
                     .map(|(a, f, p)| a * (TAU * f * time + p).sin())
                     .sum();
                 let value = command.center + style.vigour * fade * sum;
-                // A log holds six digits of a command, and that is what is sent.
+                // A log holds six decimals of a command, so the machine gets the same rounded
+                // value.
                 commands[row * nu + u] = round(value, 6);
             }
         }
@@ -76,14 +77,14 @@ impl Motion {
     }
 }
 
-/// A number to so many decimals.
+/// Rounds a number to the given decimals.
 #[must_use]
 pub fn round(value: f64, decimals: i32) -> f64 {
     let scale = 10f64.powi(decimals);
     (value * scale).round() / scale
 }
 
-/// Amplitude, frequency and phase of each sine; the amplitudes sum to the command's.
+/// Amplitude, frequency and phase of each sine; the amplitudes add up to the command's.
 fn sines(command: &Command, random: &mut impl Rng) -> Vec<(f64, f64, f64)> {
     let [low, high] = command.band;
     let mut all: Vec<(f64, f64, f64)> = (0..SINES)

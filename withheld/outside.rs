@@ -1,8 +1,10 @@
-//! Machines that others modelled: files in a folder, as `withheld/models/fetch.py` leaves them.
+//! Machines that other authors modelled: files in a folder, as `withheld/models/fetch.py` leaves
+//! them.
 //!
-//! Nothing is known of such a machine but its model: its noise is the usual one of its sensors, it is driven over a part of
-//! its actuators' range, its owner fits nothing, and none of its contacts is a site. Meshes are left out.
-//! What leaves all bounds or cannot be repeated is left out by the rules for all cases.
+//! Only the model of such a machine is known. Its sensors have their usual noise, and commands
+//! cover a part of its actuators' range. Its owner fits nothing, and none of its contacts is a
+//! site. Meshes are left out. The rules for all cases leave out a motion that diverges or cannot be
+//! repeated.
 
 mod length;
 mod meshes;
@@ -16,33 +18,33 @@ use crate::engine;
 use crate::error::{Error, Result};
 use crate::machine::{Command, Half, Machine};
 
-/// Noise by sensor: angles and orientations, rad; lengths, m.
+/// Noise by sensor: angles and orientations in rad, lengths in m.
 const NOISE: [(&str, f64); 3] = [
     ("jointpos", 0.003),
     ("framepos", 0.003),
     ("framequat", 0.006),
 ];
-/// Share of an actuator's range that it is driven over.
+/// Share of an actuator's range that its commands cover.
 const DRIVEN: f64 = 0.4;
-/// Range of an actuator that has none.
+/// Range of an actuator that states none.
 const RANGE: [f64; 2] = [-1.0, 1.0];
 /// Band of commands, Hz.
 const BAND: [f64; 2] = [0.3, 2.0];
-/// Rows a second.
+/// Rows per second.
 const RATE: f64 = 100.0;
 
-/// What was found in a folder of models.
+/// What a folder of models contains.
 pub struct Outside {
     /// Machines, sorted by the names of their files; they live as long as the program.
     pub machines: Vec<&'static Machine>,
-    /// Models that cannot be machines: a sentence each, which names the element.
+    /// Reasons why models cannot become machines: one sentence each, which names the element.
     pub refused: Vec<String>,
 }
 
 /// Reads the models of a half.
 ///
 /// # Errors
-/// When a file cannot be read.
+/// If a file cannot be read.
 pub fn read(folder: &Path, half: Half) -> Result<Outside> {
     let folder = folder.join(half.name());
     let failed = |path: &Path, message: String| Error::File {
@@ -72,7 +74,7 @@ fn keep(text: &str) -> &'static str {
 /// Makes a machine of a model.
 ///
 /// # Errors
-/// Where MuJoCo refuses it, or it has an element that the generator cannot start or read.
+/// If MuJoCo refuses the model, or if the generator cannot start or read one of its elements.
 pub fn machine(text: &str, half: Half) -> Result<&'static Machine> {
     let unfit = |why: String| Error::Unfit { why };
     let mut document = Element::parse(text).map_err(unfit)?;
@@ -134,7 +136,7 @@ pub fn machine(text: &str, half: Half) -> Result<&'static Machine> {
     Ok(Box::leak(Box::new(made)))
 }
 
-/// What the generator cannot do, in a sentence that names the element.
+/// Refuses an element that the generator does not support; the message names it.
 fn check(document: &Element) -> Result<(), String> {
     let mut wrong = None;
     document.walk(&mut |e, body| {

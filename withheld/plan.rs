@@ -1,9 +1,10 @@
-//! What each case of a set is to be: quotas, drawn by the seed.
+//! The plan of a set: what each case is to be, with quotas, drawn by the seed.
 //!
-//! Cases come in wheels of forty. In each wheel half of the worlds are dirty, eleven are clean and without a
-//! cause, five have a cause of no catalogue; seven logs have a fault, three are wired wrongly and in two the
-//! machine hardly moves. Of the causes that a machine can have the one that was used least comes next, so that a
-//! set of 600 has each of them, at each gap, about as often as its machines allow.
+//! Cases come in wheels of forty. In each wheel half of the worlds are dirty, eleven are clean and
+//! without a cause, and five have a cause of no catalogue. Seven logs have a fault, three are wired
+//! wrongly, and in two the machine hardly moves. Of the causes that a machine can have, the least
+//! used one comes next. A set of 600 thus has each cause, at each gap, about as often as its
+//! machines allow.
 
 mod kind;
 mod wanted;
@@ -26,12 +27,12 @@ use crate::random::{digest, stream};
 pub use kind::Kind;
 pub use wanted::Wanted;
 
-/// True excess gaps of causes in clean worlds, in noise floors.
+/// Excess gaps of causes in clean worlds, in noise floors.
 pub const GAPS: [f64; 4] = [1.5, 3.0, 10.0, 100.0];
-/// How far causes stand out of the dirt, in dirty worlds.
+/// Factors of the gap of the dirt that causes reach in dirty worlds.
 pub const FACTORS: [f64; 3] = [2.0, 5.0, 20.0];
 
-/// Cases of a wheel: kind, whether dirty, how many.
+/// Cases of a wheel: kind, whether dirty, and how many.
 const WHEEL: [(Kind, bool, usize); 10] = [
     (Kind::None, false, 11),
     (Kind::Single, false, 5),
@@ -44,21 +45,23 @@ const WHEEL: [(Kind, bool, usize); 10] = [
     (Kind::Group, true, 2),
     (Kind::Unknown, true, 3),
 ];
-/// Logs of a wheel with a fault.
+/// Number of logs of a wheel with a fault.
 const FAULTS: usize = 7;
-/// Logs of a wheel with wrong wiring.
+/// Number of logs of a wheel with wrong wiring.
 const WIRINGS: usize = 3;
-/// Logs of a wheel with too little excitation.
+/// Number of logs of a wheel with too little excitation.
 const LITTLE: usize = 2;
-/// Share of pairs and triples that are viscous and dry friction of one joint.
+/// Share of pairs and triples that have viscous and dry friction of one joint.
 const COMMONEST: f64 = 0.5;
 /// Share of pairs and triples that are triples.
 const TRIPLES: f64 = 0.3;
-/// Wheels without a wanted case after which there is none: the rarest kind has one case a wheel, and a half has some twenty machines, so
-/// that within so many each machine has had it several times.
+/// Consecutive wheels without a wanted case after which the search stops.
+///
+/// The rarest kind has one case per wheel, and a half has about twenty machines. Within so many
+/// wheels each machine has had that kind several times.
 const BARREN: usize = 100;
 
-/// What a case is to be.
+/// Describes what a case is to be.
 #[derive(Clone)]
 pub struct Slot {
     /// Machine, as an index of [`Plan::machines`].
@@ -67,11 +70,11 @@ pub struct Slot {
     pub kind: Kind,
     /// Its causes.
     pub causes: Vec<&'static dyn Cause>,
-    /// Whether all act at the same joint.
+    /// Whether all causes act at the same joint.
     pub same_joint: bool,
-    /// Whether everything is a little off.
+    /// Whether the world is dirty: everything deviates a little.
     pub dirty: bool,
-    /// Which of [`GAPS`] or [`FACTORS`].
+    /// Index into [`GAPS`] or [`FACTORS`].
     pub level: usize,
     /// A fault of the log.
     pub fault: Option<LogFault>,
@@ -85,7 +88,7 @@ pub struct Slot {
 pub struct Plan {
     /// Half.
     pub half: Half,
-    /// Machines, taken apart.
+    /// Machines, with the parts of their models.
     pub machines: Vec<Anatomy>,
     /// Cases.
     pub slots: Vec<Slot>,
@@ -96,7 +99,7 @@ pub struct Plan {
 struct Used(BTreeMap<&'static str, usize>);
 
 impl Used {
-    /// The cause that was used least, by lot among equals; with how often it was used.
+    /// The least used cause, with its number of uses; drawn at random among equals.
     fn next(
         &mut self,
         of: &[&'static dyn Cause],
@@ -120,18 +123,18 @@ pub fn possible(machine: &Anatomy, standing: impl Fn(Standing) -> bool) -> Vec<&
 }
 
 impl Plan {
-    /// Draws a plan for the machines of a half and some more.
+    /// Draws a plan for the machines of a half and the machines `outside`.
     ///
     /// # Errors
-    /// Where a machine's model is wrong.
+    /// If a machine's model is wrong.
     pub fn draw(half: Half, seed: u64, count: usize, outside: &[&'static Machine]) -> Result<Self> {
         Self::draw_wanted(half, (seed, count), outside, &Wanted::default())
     }
 
-    /// Draws a plan of those cases only that are wanted.
+    /// Draws a plan of the wanted cases only.
     ///
     /// # Errors
-    /// Where a machine's model is wrong, or no machine of the half has such a case.
+    /// If a machine's model is wrong, or if no machine of the half has such a case.
     pub fn draw_wanted(
         half: Half,
         (seed, count): (u64, usize),
@@ -164,7 +167,7 @@ impl Plan {
     }
 }
 
-/// Deals wheels of cases, one after the other.
+/// Deals wheels of cases one after the other.
 struct Dealer<'a> {
     machines: &'a [Anatomy],
     wanted: &'a Wanted,
@@ -228,7 +231,7 @@ impl<'a> Dealer<'a> {
     }
 }
 
-/// The next of some things in a random order that is drawn anew when all were dealt.
+/// Deals the next item of a random order; draws a new order after all items were dealt.
 fn deal<T: Copy>(left: &mut Vec<T>, all: &[T], random: &mut ChaCha8Rng) -> T {
     if left.is_empty() {
         left.extend_from_slice(all);
@@ -253,7 +256,8 @@ impl Slot {
             Kind::Single => {
                 if let Some((cause, times)) = used.next(&known, random) {
                     self.causes.push(cause);
-                    // Each cause goes through the levels, from one of its own on.
+                    // Successive uses of a cause go through the levels. Each cause begins at a
+                    // level of its own.
                     self.level = times + usize::from(digest(0, &[cause.name()])[0]);
                 }
             }
@@ -305,7 +309,7 @@ impl Slot {
             .copied()
             .collect();
         others.shuffle(random);
-        // Two of what lies between a drive and its joint exclude each other.
+        // A joint can have only one transmission, so these two exclude each other.
         let between = ["backlash", "joint-compliance"];
         for cause in others {
             let clash = between.contains(&cause.name())
@@ -316,7 +320,7 @@ impl Slot {
         }
     }
 
-    /// Excess gap or factor that the causes are sized for, so many levels below the planned one.
+    /// Excess gap or factor for which the causes are sized, `lower` levels below the planned one.
     #[must_use]
     pub fn aim(&self, lower: usize) -> f64 {
         let levels: &[f64] = if self.dirty { &FACTORS } else { &GAPS };

@@ -1,10 +1,10 @@
-//! Random streams: one seed gives each case, and each purpose within it, a stream of its own.
+//! Random streams: one seed gives a stream to each case and to each purpose within it.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sha2::{Digest, Sha256};
 
-/// A stream that depends on a seed and on names alone, and not on the order in which streams are made.
+/// A stream that depends on a seed and on names alone, not on the order in which streams are made.
 #[must_use]
 pub fn stream(seed: u64, names: &[&str]) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(digest(seed, names))

@@ -1,8 +1,9 @@
-//! In which regime of motion a machine is at a row of a log, so that a label says where the excess lies.
+//! The regime of motion of a machine at each row of a log, so that a label says where the excess
+//! lies.
 //!
-//! The names and the lines between them are those that a diagnosis reports by (`docs/withheld.md`); what is read off is the
-//! world itself, with its causes, and not a model of it. A sensor of a joint tells of its joint, a sensor of a body's
-//! pose of what the body touches.
+//! Names and limits are those by which a diagnosis reports (`docs/withheld.md`). The regime is read
+//! from the world itself, with its causes, and not from a model. For a sensor of a joint it
+//! describes that joint, for a sensor of a body's pose the contacts of that body.
 
 use std::collections::BTreeMap;
 
@@ -12,27 +13,29 @@ use crate::gap::Refit;
 use crate::label::Place;
 use crate::motion::Motion;
 
-/// Share of an episode that is its start; so in the contract of `where`, like the next two.
+/// Share of an episode that is its start. The contract of `where` sets this number and the next
+/// two.
 const START: f64 = 0.03;
-/// Share of a joint's largest speed in an episode up to which it stands.
+/// Share of a joint's largest speed in an episode up to which the joint stands.
 const SLOW: f64 = 0.03;
-/// Rows before and after a joint stands between which a change of direction is a reversal.
+/// Rows before and after a standing joint whose velocities decide about a reversal.
 const AROUND: usize = 5;
-/// Share of the squared excess below which a place is not listed: far below the tenth from which on one counts.
+/// Share of the squared excess below which a place is not listed: far below the tenth from which a
+/// place counts.
 const LISTED: f64 = 0.005;
 
-/// What a sensor's part of the machine does at a row.
+/// State of the part of the machine that a sensor reads, at one row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Glance {
-    /// Speed of the joint, rad/s or m/s.
+    /// Velocity of the joint, rad/s or m/s.
     speed: f64,
     /// Whether a drive of the joint is at a limit of its command or of its force.
     saturated: bool,
-    /// The body that the sensor's body touches.
+    /// The body that the sensor's body touches, if any.
     touches: Option<usize>,
 }
 
-/// What was seen of a world along its episodes.
+/// The states of a world along its episodes.
 pub struct Watch<'a> {
     anatomy: &'a Anatomy,
     motions: &'a [Motion],
@@ -41,7 +44,7 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Nothing seen yet.
+    /// A watch that has seen nothing yet.
     #[must_use]
     pub fn new(anatomy: &'a Anatomy, motions: &'a [Motion]) -> Self {
         Self {
@@ -51,7 +54,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Looks at a world after a step of an episode, where that is the step of a row.
+    /// Records the state of a world after a step of an episode, if a row falls on that step.
     pub fn look(&mut self, sim: &Sim, step: usize) {
         let motion = &self.motions[sim.episode];
         let step_of = |row: usize| (row as f64 * motion.period / sim.dt).round() as usize;
@@ -124,7 +127,10 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Largest speed of a sensor's joint in an episode; and, where the episode has them, its velocities some rows before and after.
+/// Largest speed of a sensor's joint in an episode, and its velocities `AROUND` rows before and
+/// after.
+///
+/// The velocities are missing if the episode ends before the later row.
 fn around(episode: &[Glance], n: usize, sensor: usize, row: usize) -> Vec<f64> {
     let speeds = || episode.iter().skip(sensor).step_by(n).map(|g| g.speed);
     let mut found = vec![speeds().fold(0.0, |a: f64, v| a.max(v.abs()))];
@@ -138,7 +144,7 @@ fn around(episode: &[Glance], n: usize, sensor: usize, row: usize) -> Vec<f64> {
 /// Shares of the squared excess by column and regime, largest first.
 #[must_use]
 pub fn places(anatomy: &Anatomy, left: &Refit, regimes: &[String]) -> Vec<Place> {
-    // The sensor of each column of a row, and the column's name.
+    // The sensor and the name of each column of a row.
     let columns: Vec<(usize, String)> = anatomy
         .sensors
         .iter()

@@ -1,29 +1,31 @@
-//! The rotor of a drive, apart from the joint that it drives.
+//! The rotor of a drive, separate from the joint that it drives.
 //!
-//! What lies between the two, play or elasticity, is a law of the difference of their angles. The rotor
-//! is integrated by hand over many small steps within one of the engine's, while the joint moves on at its
-//! speed; the mean of the transmitted force acts on the joint. The engine's own actuator and armature are off.
+//! The transmission between them, play or elasticity, is a law of the difference of their angles.
+//! The rotor is integrated by hand in many small steps within one step of the engine, while the
+//! joint moves on at constant speed. The mean of the transmitted force acts on the joint. The
+//! engine's own actuator and armature are off.
 
 use crate::anatomy::{Anatomy, Drive, DriveKind};
 use crate::engine::Sim;
 use crate::world::{Force, World};
 
-/// Share of a joint's inertia that the rotor of a servo gets where the model gives it none: too
-/// little to be seen, enough to be integrated.
+/// Inertia of a servo's rotor if the model gives none, as a share of the joint's inertia.
+///
+/// It is too small to be seen and large enough to be integrated.
 const LIGHT: f64 = 0.003;
-/// Largest phase, rad, of the fastest oscillation of the rotor within a small step.
+/// Largest phase, rad, of the rotor's fastest oscillation within a small step.
 const PHASE: f64 = 0.2;
-/// Most small steps within a step.
+/// Maximum number of small steps within a step.
 const MOST: f64 = 400.0;
-/// Damping ratio of the transmission's own oscillation: metal on metal, with its grease.
+/// Damping ratio of the transmission's own oscillation: metal on metal with grease.
 const RATIO: f64 = 0.3;
 
-/// What lies between rotor and joint.
+/// The transmission between rotor and joint.
 #[derive(Clone, Copy, Debug)]
 pub enum Transmission {
-    /// Play of this width, rad or m, between ends that give way little.
+    /// Play of this width, rad or m, between slightly compliant ends.
     Play(f64),
-    /// Elasticity, rad/(N m) or m/N.
+    /// Compliance, rad/(N m) or m/N.
     Compliance(f64),
 }
 
@@ -35,7 +37,7 @@ pub struct Rotor {
     qpos: usize,
     dof: usize,
     armature: f64,
-    /// Inertia, as soon as an episode has begun.
+    /// Inertia, set when an episode begins.
     inertia: f64,
     stiffness: f64,
     damping: f64,
@@ -44,7 +46,7 @@ pub struct Rotor {
 }
 
 impl Rotor {
-    /// Takes a joint's drive out of the engine and puts a rotor in its place.
+    /// Removes a joint's drive from the engine and puts a rotor in its place.
     pub fn install(machine: &Anatomy, joint: usize, how: Transmission, world: &mut World) {
         let Some(actuator) = machine.drive_of(joint) else {
             return;
@@ -55,7 +57,7 @@ impl Rotor {
         let armature = element.and_then(|e| e.number("armature")).unwrap_or(0.0);
         world.edit_joint(&j.name, "armature", |_| 0.0);
         if let Some(e) = world.document.find_in_mut("actuator", &drive.name) {
-            // Other causes may have changed the drive.
+            // Other causes may have changed the drive's values.
             drive.kp = e.number("kp").unwrap_or(drive.kp);
             drive.kv = e.number("kv").unwrap_or(drive.kv);
             drive.limit = e
@@ -63,7 +65,8 @@ impl Rotor {
                 .last()
                 .copied()
                 .unwrap_or(drive.limit);
-            // A motor of no gear: the command goes to the rotor instead.
+            // The engine's actuator becomes a motor without gear; the command goes to the rotor
+            // instead.
             e.tag = "motor".into();
             e.attributes.retain(|(n, _)| {
                 !matches!(
@@ -100,7 +103,7 @@ impl Rotor {
         d.gear * force.clamp(-d.limit, d.limit)
     }
 
-    /// Force on the joint, where the rotor is ahead of it by `twist` and faster by `rate`.
+    /// Force on the joint if the rotor is ahead of it by `twist` and faster by `rate`.
     fn transmitted(&self, twist: f64, rate: f64) -> f64 {
         match self.transmission {
             Transmission::Compliance(_) => self.stiffness * twist + self.damping * rate,
@@ -110,7 +113,7 @@ impl Rotor {
                     return 0.0;
                 }
                 let side = twist.signum();
-                // The ends push and never pull.
+                // The ends push but never pull.
                 side * (self.stiffness * depth + self.damping * rate * side).max(0.0)
             }
         }
@@ -125,7 +128,8 @@ impl Force for Rotor {
         } else {
             LIGHT * link
         };
-        // As stiff as the joint's side of the engine's step allows: its phase in a step is 0.3.
+        // The largest stiffness that the engine's step allows on the joint's side: a phase of 0.3
+        // per step.
         let most = link * (0.3 / sim.dt).powi(2);
         self.stiffness = match self.transmission {
             Transmission::Play(_) => most,
@@ -134,7 +138,7 @@ impl Force for Rotor {
         let reduced = self.inertia * link / (self.inertia + link);
         self.damping = 2.0 * RATIO * (self.stiffness * reduced).sqrt();
         if let Transmission::Compliance(_) = self.transmission {
-            // Elastic elements of drives lose little.
+            // Elastic elements of drives dissipate little.
             self.damping *= 0.1;
         }
         self.angle = sim.qpos()[self.qpos];
@@ -156,7 +160,8 @@ impl Force for Rotor {
         for _ in 0..small as usize {
             let force = self.transmitted(self.angle - joint, self.speed - rate);
             sum += force;
-            // The drive's damping is implicit: a light rotor would not bear it otherwise.
+            // The drive's damping is integrated implicitly; an explicit step would be unstable for
+            // a light rotor.
             let push = (self.drive_force(command) - force) * dt;
             self.speed += push / (self.inertia + viscous * dt);
             self.angle += self.speed * dt;

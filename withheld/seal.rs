@@ -1,9 +1,9 @@
-//! The seal: what binds labels to studies before anybody has seen a label.
+//! The seal binds labels to studies before anybody has seen a label.
 //!
-//! Beside the studies lies `seal.json` with a commitment for each case, SHA-256 of a salt, the
-//! case's name, its study's files and its label. Without the salt, which lies with the labels, a commitment says
-//! nothing about a label, not even by trying all of them; with it anyone can check that neither label nor
-//! study was changed afterwards.
+//! Beside the studies lies `seal.json`, which holds a commitment for each case. It is the SHA-256
+//! of a salt, the case's name, its study's files and its label. The salt lies with the labels.
+//! Without it a commitment reveals nothing about a label, not even to somebody who tries all
+//! labels. With it anyone can verify that neither label nor study was changed afterwards.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,9 +22,9 @@ pub const LABELS: &str = "labels.json";
 /// The seal of a set of cases.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seal {
-    /// 1.
+    /// Version of the format: 1.
     pub schema: u32,
-    /// How a commitment is made.
+    /// How a commitment is computed.
     pub commitment: String,
     /// Commitments by case.
     pub cases: BTreeMap<String, String>,
@@ -56,8 +56,8 @@ pub fn commitment(case: &str, study: &[u8; 32], label: &Label) -> String {
         salt: String::new(),
         ..label.clone()
     };
-    // Numbers are written so that they are read back to the bit, and keys are sorted or in the order
-    // of the type: the text is the same on every machine.
+    // Numbers are written so that they are read back to the bit. Keys are sorted or in the order of
+    // the type. The text is therefore the same on every machine.
     let text = serde_json::to_string(&bare).unwrap_or_default();
     let mut hash = Sha256::new();
     for part in [
@@ -72,10 +72,10 @@ pub fn commitment(case: &str, study: &[u8; 32], label: &Label) -> String {
     hex(&hash.finalize())
 }
 
-/// What is wrong with a set of sealed cases; empty where nothing is.
+/// Checks the seal of a set; returns what is wrong, or nothing.
 ///
 /// # Errors
-/// When a file cannot be read.
+/// If a file cannot be read.
 pub fn verify(studies: &Path, labels: &Path) -> Result<Vec<String>> {
     let seal: Seal = read(&studies.join(SEAL))?;
     let labels: BTreeMap<String, Label> = read(labels)?;
@@ -111,7 +111,7 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
 /// Names and contents of a study's files.
 ///
 /// # Errors
-/// When a file cannot be read.
+/// If a file cannot be read.
 pub(crate) fn files(folder: &Path) -> Result<BTreeMap<String, String>> {
     let entries = std::fs::read_dir(folder).map_err(|e| failed(folder, &e))?;
     let paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();

@@ -6,48 +6,48 @@ use crate::error::{Error, Result};
 use crate::motion::Motion;
 use crate::world::World;
 
-/// What the sensors would read without noise: one series an episode, a row each time step.
+/// The sensors' readings without noise: one series per episode, one row per time step.
 #[derive(Clone, Debug)]
 pub struct Record {
     /// Time step, s.
     pub dt: f64,
-    /// Numbers of a row.
+    /// Number of values in a row.
     pub width: usize,
     /// Each episode, `steps x width`.
     pub episodes: Vec<Vec<f64>>,
-    /// What the machine typically did.
+    /// Typical motion and forces of the machine.
     pub typical: Typical,
 }
 
-/// Root mean squares over all episodes.
+/// Typical magnitudes over all episodes; root mean squares unless a field says otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct Typical {
-    /// Speed of each velocity, rad/s or m/s.
+    /// Speed of each degree of freedom, rad/s or m/s.
     pub speed: Vec<f64>,
-    /// Force of the drives at each velocity, N m or N.
+    /// Force of the drives at each degree of freedom, N m or N.
     pub drive: Vec<f64>,
-    /// Weight and inertial couplings at each velocity, N m or N.
+    /// Gravity and inertial coupling forces at each degree of freedom, N m or N.
     pub weight: Vec<f64>,
-    /// Departure of each command from its mean.
+    /// Standard deviation of each command.
     pub command: Vec<f64>,
-    /// Largest force of the drives at each velocity, N m or N.
+    /// Largest force of the drives at each degree of freedom, N m or N.
     pub peak: Vec<f64>,
-    /// Spread of each number of the readings.
+    /// Standard deviation of each value of the readings.
     pub spread: Vec<f64>,
     /// Mean of each position.
     pub mean: Vec<f64>,
-    /// Spread of each position.
+    /// Standard deviation of each position.
     pub roam: Vec<f64>,
 }
 
 impl Record {
-    /// A number of the readings at a time of an episode, between time steps on a line.
+    /// A reading at a time of an episode, interpolated linearly between time steps.
     #[must_use]
     pub fn at(&self, episode: usize, time: f64, column: usize) -> f64 {
         let rows = &self.episodes[episode];
         let last = rows.len() / self.width - 1;
         let place = (time / self.dt).clamp(0.0, last as f64);
-        // A time that is a multiple of the step but for rounding is that step.
+        // A time that equals a multiple of the step except for rounding is that step.
         let near = place.round();
         if (place - near).abs() < 1e-6 {
             return rows[near as usize * self.width + column];
@@ -65,12 +65,12 @@ impl Record {
 /// Runs all episodes of a world.
 ///
 /// # Errors
-/// Where the model is refused or a simulation leaves all bounds.
+/// If the model is refused or a simulation diverges.
 pub fn simulate(anatomy: &Anatomy, world: &mut World, motions: &[Motion]) -> Result<Record> {
     watched(anatomy, world, motions, &mut |_, _| {})
 }
 
-/// The same; `look` sees the simulation after each step, with the number of the step in its episode.
+/// Runs all episodes of a world; calls `look` after each step, with its number in its episode.
 ///
 /// # Errors
 /// As [`simulate`].

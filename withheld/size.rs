@@ -1,23 +1,23 @@
-//! The size of a cause that gives a wanted excess gap.
+//! Finds the size of a cause that gives a wanted excess gap.
 
 use crate::error::{Error, Result};
 use crate::gap::Bench;
 use crate::world::World;
 
-/// How near the logarithm of the gap comes to that of the target where the search ends.
+/// Difference between the logarithms of gap and target at which the search ends.
 const NEAR: f64 = 0.08;
-/// How near it must come for the case to be kept.
+/// Largest such difference at which the case is kept.
 const CLOSE: f64 = 0.25;
-/// Most runs of a search.
+/// Maximum number of runs of a search.
 const RUNS: usize = 12;
-/// Where the search begins, as a share of the largest size.
+/// Share of the largest size at which the search begins.
 const FIRST: f64 = 0.02;
 /// Smallest share of the largest size.
 const LEAST: f64 = 1e-7;
-/// Corrections after the refit by replays.
+/// Number of corrections after the refit by replays.
 const CORRECTIONS: usize = 2;
 
-/// A size that was found.
+/// The result of a search.
 #[derive(Clone, Debug)]
 pub struct Sized {
     /// Share of the largest size.
@@ -26,13 +26,13 @@ pub struct Sized {
     pub excess: f64,
 }
 
-/// Finds the share of the largest size at which a world has an excess gap; `None` where there is none.
+/// Finds the share of the largest size at which a world has an excess gap; `None` if there is none.
 ///
-/// The gap grows with the size by a power that is not known (1 for most causes, more for thresholds):
-/// secants on logarithms, within a bracket.
+/// The gap grows with the size by an unknown power: 1 for most causes, more for thresholds. The
+/// search therefore takes secant steps on logarithms within a bracket.
 ///
 /// # Errors
-/// Where the machine's model is wrong. A diverged simulation counts as a gap too large.
+/// If the machine's model is wrong. A diverged simulation counts as a gap that is too large.
 pub fn solve(
     bench: &Bench<'_>,
     target: f64,
@@ -78,10 +78,11 @@ pub fn solve(
     Ok(None)
 }
 
-/// Secants on logarithms within a bracket.
+/// Secant search on logarithms within a bracket.
 struct Search {
     goal: f64,
-    /// Largest share known to be too little and smallest known to be too much, with their gaps.
+    /// Logarithm of the largest share known to be too small, and its gap; the next field holds the
+    /// smallest share known to be too large.
     low: Option<(f64, f64)>,
     high: Option<(f64, f64)>,
 }
@@ -95,7 +96,7 @@ impl Search {
         }
     }
 
-    /// The next share to try; `None` where the bounds of the size are reached.
+    /// The next share to try; `None` if the bounds of the size are reached.
     fn next(&mut self, share: f64, gap: f64) -> Option<f64> {
         let at = share.ln();
         if gap < self.goal {
@@ -112,7 +113,7 @@ impl Search {
         let next = match (self.low, self.high) {
             (Some((a, x)), Some((b, y))) if x.is_finite() && y.is_finite() => {
                 let along = (self.goal - x) / (y - x);
-                // Away from the ends, so that a bracket shrinks from both sides.
+                // Stay away from the ends, so that the bracket shrinks from both sides.
                 a + (b - a) * along.clamp(0.1, 0.9)
             }
             (Some((a, _)), Some((b, _))) => (a + b) / 2.0,

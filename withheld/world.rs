@@ -1,7 +1,7 @@
-//! A world: a machine's model with edits, and what was written by hand beside the engine.
+//! A world: a machine's model with edits, and forces and filters outside the engine.
 //!
-//! A cause changes a world in one of four ways: it edits the model's text, it filters a command, it
-//! adds a force between the two halves of a step, or it distorts what a sensor reads.
+//! A cause changes a world in one of four ways. It edits the model's text, filters a command, adds
+//! a force between the two halves of a step, or distorts a sensor's reading.
 
 use crate::anatomy::Anatomy;
 use crate::document::Element;
@@ -10,49 +10,49 @@ use crate::error::{Error, Result};
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
-/// What happens to a command on its way.
+/// Transforms a command on its way to the actuator.
 pub trait CommandPath: Send {
-    /// Says which episode begins.
+    /// Announces the number of the episode that begins.
     fn episode(&mut self, _number: usize) {}
-    /// Begins an episode whose command was `first` before it.
+    /// Begins an episode before which the command was `first`.
     fn begin(&mut self, first: f64, dt: f64);
-    /// The command that arrives during the next step, of the one that is sent in it.
+    /// Returns the command that arrives during the next step, given the command sent in it.
     fn next(&mut self, sent: f64) -> f64;
 }
 
-/// A force, or a change of the contacts, by hand.
+/// A force, or a change of contact coefficients, that is computed outside the engine.
 pub trait Force: Send {
     /// Begins an episode.
     fn begin(&mut self, _sim: &mut Sim) {}
-    /// Before the step: changes of coefficients that the engine reads while it finds contacts.
+    /// Acts before the step: changes coefficients that the engine reads while it finds contacts.
     fn before(&mut self, _sim: &mut Sim) {}
-    /// Between the halves of the step: forces at the present position and velocity.
+    /// Acts between the halves of the step: adds forces at the present position and velocity.
     fn act(&mut self, sim: &mut Sim);
 }
 
-/// What happens to one number of a reading on its way.
+/// Distorts one value of a reading.
 pub trait ReadingPath: Send {
-    /// Distorts the number over an episode, one value a time step of `dt` s.
+    /// Distorts the value over an episode: one entry per time step of `dt` s.
     fn distort(&self, values: &mut [f64], dt: f64, episode: usize);
 }
 
-/// A change of a body's mass, centre and moments.
+/// A change of a body's mass, centre of mass and moments of inertia.
 #[derive(Clone, Debug)]
 pub struct InertiaEdit {
     /// Body.
     pub body: String,
-    /// Factor of the mass; the moments grow with it.
+    /// Factor of the mass; the moments of inertia scale with it.
     pub mass: f64,
-    /// Mass that is added in proportion, kg.
+    /// Added mass with the same distribution as the body's, kg.
     pub payload: f64,
-    /// Shift of the centre in the body's frame, m.
+    /// Shift of the centre of mass in the body's frame, m.
     pub shift: [f64; 3],
-    /// Factor of the moments about the centre.
+    /// Factor of the moments of inertia about the centre of mass.
     pub moments: f64,
 }
 
 impl InertiaEdit {
-    /// No change of a body.
+    /// An edit that changes nothing.
     #[must_use]
     pub fn of(body: &str) -> Self {
         Self {
@@ -67,28 +67,30 @@ impl InertiaEdit {
 
 /// A world, ready to be run.
 pub struct World {
-    /// Whether rapier moves it, and not MuJoCo.
+    /// Whether rapier moves it instead of MuJoCo.
     pub by_rapier: bool,
     /// The model.
     pub document: Element,
-    /// Changes of bodies.
+    /// Changes of the bodies' inertias.
     pub inertias: Vec<InertiaEdit>,
-    /// What happens to commands: index of the actuator, and how; in order.
+    /// Command filters, applied in order, each with the index of its actuator.
     pub commands: Vec<(usize, Box<dyn CommandPath>)>,
-    /// Forces by hand.
+    /// Forces that act between the halves of a step.
     pub forces: Vec<Box<dyn Force>>,
-    /// What happens to readings: index in the row of readings, and how; in order.
+    /// Distortions of readings, applied in order, each with its index in the row of readings.
     pub readings: Vec<(usize, Box<dyn ReadingPath>)>,
-    /// Steps of readings: index in the row of readings, size of a step.
+    /// Quantisation steps of readings: index in the row of readings, and size of the step.
     pub steps: Vec<(usize, f64)>,
 }
 
 impl World {
-    /// The machine as its model has it, but with the true values of the study's parameters, at
-    /// another time step, by an integrator of MuJoCo's or by [rapier](engine::RAPIER).
+    /// The machine of the study's model with the true values of the study's parameters.
+    ///
+    /// It runs at another time step, with an integrator of MuJoCo or moved by
+    /// [rapier](engine::RAPIER).
     ///
     /// # Errors
-    /// Where a parameter's target is not in the model.
+    /// If a parameter's target is not in the model.
     pub fn new(anatomy: &Anatomy, truth: &[f64], timestep: f64, integrator: &str) -> Result<Self> {
         let mut world = Self {
             by_rapier: integrator == engine::RAPIER,
@@ -116,7 +118,7 @@ impl World {
             if !option.children.iter().any(|c| c.tag == "flag") {
                 option.children.push(Element::new("flag"));
             }
-            // A simulation that went bad must be seen, not restarted.
+            // A diverged simulation must be seen, not restarted.
             for flag in option.children.iter_mut().filter(|c| c.tag == "flag") {
                 flag.set("autoreset", "disable");
             }
@@ -127,7 +129,7 @@ impl World {
     /// Compiles the model with all its edits.
     ///
     /// # Errors
-    /// MuJoCo's message.
+    /// Returns MuJoCo's message.
     pub fn compile(&self, machine: &str) -> Result<MjModel> {
         let refused = |message: String| Error::Model {
             machine: machine.to_owned(),
@@ -153,7 +155,7 @@ impl World {
         engine::compile(&document.text()).map_err(refused)
     }
 
-    /// Changes an attribute of a joint: the old value, 0 where there is none, to the new one.
+    /// Changes an attribute of a joint; a missing attribute counts as 0.
     pub fn edit_joint(&mut self, name: &str, attribute: &str, change: impl Fn(f64) -> f64) {
         if let Some(joint) = self.document.find_mut("joint", Some(name)) {
             let old = joint.number(attribute).unwrap_or(0.0);
@@ -161,7 +163,7 @@ impl World {
         }
     }
 
-    /// Changes a number of an attribute of a geom; one that is not there stays so.
+    /// Changes one value of an attribute of a geom; a missing value stays missing.
     pub fn edit_geom(
         &mut self,
         name: &str,
@@ -178,8 +180,10 @@ impl World {
         }
     }
 
-    /// Adds dry friction to a joint (0 where a law adds it from step to step): the engine's, stiff enough
-    /// that what it holds creeps by less than a thousandth of what the load would accelerate it to in 1 ms.
+    /// Adds dry friction to a joint; 0 if a law adds it at each step.
+    ///
+    /// The friction is the engine's own. It is so stiff that a held joint creeps by less than a
+    /// thousandth of the speed that its load would give it in 1 ms.
     pub fn dry_joint(&mut self, name: &str, force: f64, timestep: f64) {
         if let Some(joint) = self.document.find_mut("joint", Some(name)) {
             let old = joint.number("frictionloss").unwrap_or(0.0);
@@ -197,7 +201,7 @@ impl World {
     }
 }
 
-/// Sets what a study's parameter names.
+/// Sets the value of a study's parameter.
 fn set_target(document: &mut Element, target: &str, value: f64) -> Option<()> {
     let mut parts = target.split('/');
     let (tag, name, attribute) = (parts.next()?, parts.next()?, parts.next()?);

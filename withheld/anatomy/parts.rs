@@ -24,9 +24,9 @@ pub struct Joint {
     pub kind: JointKind,
     /// Body that it moves.
     pub body: String,
-    /// First position.
+    /// Index of its first position in `qpos`.
     pub qpos: usize,
-    /// First velocity.
+    /// Index of its first velocity in `qvel`.
     pub dof: usize,
     /// Rotor inertia, kg m² or kg.
     pub armature: f64,
@@ -34,16 +34,16 @@ pub struct Joint {
     pub damping: f64,
 }
 
-/// Law of an actuator.
+/// Force law of an actuator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveKind {
     /// The command is the force.
     Motor,
-    /// A servo of position.
+    /// A position servo.
     Position,
-    /// A servo of velocity.
+    /// A velocity servo.
     Velocity,
-    /// A force at a place of a body.
+    /// A force at a site of a body.
     Thrust,
 }
 
@@ -54,19 +54,20 @@ pub struct Drive {
     pub name: String,
     /// Law.
     pub kind: DriveKind,
-    /// Joint that it drives alone, as an index of `Anatomy::joints`; none for a tendon or a place.
+    /// The only joint that it drives, as an index of `Anatomy::joints`; `None` for a tendon or a
+    /// site.
     pub joint: Option<usize>,
-    /// Gear.
+    /// Gear ratio.
     pub gear: f64,
     /// `kp` of a position servo.
     pub kp: f64,
     /// `kv` of a servo.
     pub kv: f64,
-    /// Largest force, where it is limited.
+    /// Largest force, if it is limited.
     pub limit: f64,
 }
 
-/// What a sensor tells of.
+/// The part of the machine that a sensor reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reads {
     /// A joint, as an index of `Anatomy::joints`.
@@ -84,13 +85,13 @@ pub struct Sensor {
     pub name: String,
     /// Tag in the model.
     pub kind: String,
-    /// What it tells of.
+    /// The part that it reads.
     pub reads: Reads,
-    /// First number of its reading.
+    /// Index of the first value of its reading in a row of readings.
     pub address: usize,
-    /// Numbers of its reading.
+    /// Number of values of its reading.
     pub len: usize,
-    /// Standard deviation of the noise of each number.
+    /// Standard deviation of the noise of each value.
     pub noise: f64,
 }
 
@@ -111,7 +112,7 @@ impl Sensor {
     }
 }
 
-/// Kind of the joint that an element is.
+/// Kind of joint that an element defines; `None` if the element is no supported joint.
 pub(super) fn joint_kind(tag: &str, element: &Element) -> Option<JointKind> {
     match (tag, element.get("type")) {
         ("freejoint", _) => Some(JointKind::Free),
@@ -122,7 +123,7 @@ pub(super) fn joint_kind(tag: &str, element: &Element) -> Option<JointKind> {
     }
 }
 
-/// What a sensor of a compiled model tells of.
+/// The part of the machine that a sensor of a compiled model reads.
 pub(super) fn reads(model: &MjModel, sensor: usize, joints: &[Joint]) -> Reads {
     let Ok(id) = usize::try_from(model.sensor_objid()[sensor]) else {
         return Reads::Other;
@@ -141,7 +142,7 @@ pub(super) fn reads(model: &MjModel, sensor: usize, joints: &[Joint]) -> Reads {
     }
 }
 
-/// The actuator that an element is.
+/// The actuator that an element defines.
 pub(super) fn drive(e: &Element, joints: &[Joint]) -> Drive {
     let joint = e.get("joint");
     let joint = joint.and_then(|name| joints.iter().position(|j| j.name == name));

@@ -1,4 +1,5 @@
-//! Rules by which a draw is left out: nobody could tell its cause, or repeat it.
+//! Rules that leave out a draw whose cause nobody could tell, or whose readings nobody could
+//! repeat.
 
 use super::Draw;
 use super::sizing::Causes;
@@ -9,21 +10,26 @@ use crate::gap::Bench;
 use crate::simulate::simulate;
 use crate::world::World;
 
-/// A case is left out where the study's time step alone makes a gap of more than this, in noise floors:
-/// its motion is chaotic, or its model too coarse. So where the world is of another engine than the study: the two
-/// do not agree on what happens without a cause.
+/// Largest gap that the study's time step alone may make, in noise floors; a draw with a larger gap
+/// is left out.
+///
+/// The motion of such a draw is chaotic, or its model is too coarse. The same limit applies if
+/// another engine moves the world than the study: the two engines must agree on what happens
+/// without a cause.
 const INTEGRATION: f64 = 0.5;
-/// A case is left out where half the world's time step changes its readings by more than this, in noise floors,
-/// or by more than this share of its excess gap: nobody could repeat it.
+/// Largest change of the readings when the world's time step is halved: in noise floors, and as a
+/// share of the excess gap.
+///
+/// The larger of the two limits applies. Nobody could repeat the readings of a draw beyond it.
 const REPEATABLE: [f64; 2] = [0.5, 0.05];
 /// Episodes in which a world is run again at half its time step.
 const CHECKED: usize = 3;
 
-/// Why a draw was left out.
+/// Why a draw is left out.
 pub(super) enum LeftOut {
-    /// By a stated rule.
+    /// A stated rule excludes it.
     Rule(String),
-    /// The generator is wrong.
+    /// The generator itself failed.
     Fault(Error),
 }
 
@@ -37,7 +43,7 @@ impl From<Error> for LeftOut {
 }
 
 impl Draw<'_> {
-    /// Gap that the study's own engine, time step and integrator make, without a cause.
+    /// Gap that the engine, time step and integrator of the study make without a cause.
     pub(super) fn integration_gap(&self, bench: &Bench<'_>) -> Result<f64, LeftOut> {
         let option = self.anatomy.document.find("option", None);
         let integrator = option.and_then(|o| o.get("integrator")).unwrap_or("Euler");
@@ -57,7 +63,7 @@ impl Draw<'_> {
         Ok(gap)
     }
 
-    /// Leaves out what half the time step changes.
+    /// Leaves the draw out if half the time step changes its readings too much.
     pub(super) fn repeatable(
         &self,
         bench: &Bench<'_>,

@@ -1,4 +1,4 @@
-//! Which causes a draw has, and of what size.
+//! Selects the causes of a draw and their sizes.
 
 use std::collections::BTreeMap;
 
@@ -16,12 +16,13 @@ use crate::plan::{Kind, possible};
 use crate::size::solve;
 use crate::world::World;
 
-/// Causes that are tried in one draw.
+/// Sets of causes that are tried in one draw.
 const TRIES: u32 = 10;
-/// Gap of dirt below which causes stand out of this instead, in noise floors: the least factor then gives the
-/// least gap of clean worlds.
+/// Gap that dirt counts as having at least, in noise floors.
+///
+/// With it the smallest factor of dirty worlds gives the smallest gap of clean worlds.
 const LEAST_DIRT: f64 = 0.75;
-/// Episodes in which an item of dirt is measured.
+/// Episodes in which the gap of an item of dirt is measured.
 const SAMPLE: usize = 2;
 
 /// The causes of a case, sized.
@@ -49,7 +50,7 @@ impl Draw<'_> {
             .collect();
     }
 
-    /// A world with some items.
+    /// Returns a world with the given items.
     pub(super) fn with(&self, bench: &Bench<'_>, items: &[Item]) -> Result<World> {
         let mut world = bench.world(&bench.truth)?;
         for item in items {
@@ -66,7 +67,9 @@ impl Draw<'_> {
         Ok(bench.refit(&readings)?.excess)
     }
 
-    /// Causes of the planned size; else at another site, of a smaller size, or other causes.
+    /// Finds causes of the planned size.
+    ///
+    /// If that fails, it tries another site, then a smaller size, then other causes.
     pub(super) fn sized_causes(
         &mut self,
         bench: &Bench<'_>,
@@ -98,7 +101,7 @@ impl Draw<'_> {
         Err(LeftOut::Rule(last))
     }
 
-    /// Draws sites and finds the sizes that give each cause alone its share of the target.
+    /// Draws sites and finds the sizes at which each cause alone reaches its share of the target.
     pub(super) fn size(&mut self, bench: &Bench<'_>, target: f64) -> Result<Causes, LeftOut> {
         let mut found = Causes::default();
         let slot = self.slot.clone();
@@ -147,7 +150,7 @@ impl Draw<'_> {
         Ok(found)
     }
 
-    /// The world with everything in it. Causes come after dirt.
+    /// The world with all dirt and causes. Causes come after dirt.
     pub(super) fn world(
         &self,
         bench: &Bench<'_>,
@@ -161,7 +164,8 @@ impl Draw<'_> {
             .iter()
             .chain(&causes.items)
             .partition(|i| matches!(i.cause.name(), "backlash" | "joint-compliance"));
-        // One transmission a joint: a cause's rather than dirt's.
+        // A joint can have one transmission only. A cause's transmission takes precedence over that
+        // of dirt.
         let mut joints: Vec<&str> = Vec::new();
         for item in others.into_iter().chain(between.into_iter().rev()) {
             if matches!(item.cause.name(), "backlash" | "joint-compliance") {
@@ -175,7 +179,7 @@ impl Draw<'_> {
         Ok(world)
     }
 
-    /// Each item of dirt with its own excess gap, measured in the first episodes.
+    /// Measures the excess gap of each item of dirt by itself, in the first episodes.
     pub(super) fn measure_dirt(
         &self,
         bench: &Bench<'_>,

@@ -1,4 +1,4 @@
-//! How a draw is written: the style of its logs, its study file and its label.
+//! Writes a draw: the style of its logs, its study file and its label.
 
 use std::collections::BTreeMap;
 
@@ -17,17 +17,18 @@ use crate::log;
 use crate::plan::Kind;
 use crate::world::World;
 
-/// Correlation of the noise from row to row in dirty worlds.
+/// Range of the noise correlation from row to row in dirty worlds.
 const COLOUR: [f64; 2] = [0.1, 0.5];
-/// That of logs with filtered noise.
+/// Correlation of the noise from row to row in logs with filtered noise.
 const FILTERED: f64 = 0.95;
-/// Deviation of the times of reading from their stamps in dirty worlds, as a share of the time between rows.
+/// Standard deviation of the reading times about their stamps in dirty worlds, as a share of the
+/// time between rows.
 const JITTER: [f64; 2] = [0.01, 0.04];
-/// That of logs with jittered stamps.
+/// The same deviation in logs with jittered stamps.
 const JITTERED: f64 = 0.15;
 /// Share of cases whose study gives the noise.
 const NOISE_GIVEN: f64 = 0.25;
-/// Share of cases whose logs do not give their start.
+/// Share of cases whose logs do not give the initial state.
 const NO_START: f64 = 0.2;
 
 impl Draw<'_> {
@@ -38,7 +39,7 @@ impl Draw<'_> {
                 let spread = &bench.typical.spread;
                 let drawn = Wiring::draw(kind, self.anatomy, spread, &mut self.random);
                 if drawn.is_none() {
-                    // Another fault of wiring, where the machine has columns for one.
+                    // A wrong sign replaces a fault for which the machine has no columns.
                     self.slot.wiring = Some(WiringKind::Sign);
                 }
                 drawn.or_else(|| {
@@ -81,7 +82,7 @@ impl Draw<'_> {
         if self.random.random::<f64>() < NOISE_GIVEN {
             text += "\n[noise]\n";
             for (name, noise) in self.anatomy.machine.noise {
-                // A name may have what a bare key of TOML may not.
+                // A name may contain characters that a bare key of TOML must not have.
                 text += &format!("\"{name}\" = {noise}\n");
             }
         }
@@ -167,7 +168,7 @@ impl Draw<'_> {
             salt: String::new(),
         };
         if self.slot.little && !causes.items.is_empty() {
-            // Where the machine hardly moves, nothing may be there to be seen.
+            // If the machine hardly moves, its readings may not show the cause.
             label.acceptable.push(vec!["none".to_owned()]);
         }
         let mut nowhere = World::new(self.anatomy, truth, bench.timestep, bench.integrator).ok();

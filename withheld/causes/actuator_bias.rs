@@ -1,4 +1,4 @@
-//! `actuator-bias`: a command is shifted.
+//! `actuator-bias`: a command is shifted by a constant.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, drives};

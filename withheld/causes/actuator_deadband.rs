@@ -1,4 +1,4 @@
-//! `actuator-deadband`: a small command does nothing; of a position servo, a small error.
+//! `actuator-deadband`: a small command has no effect; for a position servo, a small error.
 
 use crate::anatomy::{Anatomy, DriveKind};
 use crate::cause::{Cause, Place, Values, joint_drives};
@@ -10,7 +10,7 @@ pub struct ActuatorDeadband;
 
 struct Deadband {
     actuator: usize,
-    /// Position and gear of what a position servo holds.
+    /// Index of the position and gear of the joint that a position servo holds.
     servo: Option<(usize, f64)>,
     width: f64,
 }

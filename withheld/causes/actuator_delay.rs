@@ -1,4 +1,4 @@
-//! `actuator-delay`: a command arrives later, by any time and not by whole steps only.
+//! `actuator-delay`: a command arrives later, by any time and not only by whole steps.
 
 use std::collections::VecDeque;
 
@@ -9,8 +9,10 @@ use crate::world::{CommandPath, World};
 /// The cause.
 pub struct ActuatorDelay;
 
-/// A delay line. A command holds for a step; what arrives in a step is the mean of the two
-/// commands that a delay of a broken number of steps spreads it over.
+/// A delay line for commands.
+///
+/// A command holds for one step. If the delay is not a whole number of steps, two commands overlap
+/// with a step; their weighted mean arrives in it.
 pub struct Delay {
     /// Delay, s.
     pub seconds: f64,
@@ -19,7 +21,7 @@ pub struct Delay {
 }
 
 impl Delay {
-    /// A delay of some seconds.
+    /// A delay line with a delay in seconds.
     #[must_use]
     pub fn new(seconds: f64) -> Self {
         Self {

@@ -1,4 +1,5 @@
-//! `actuator-hysteresis`: a command is followed with play (the play operator of Krasnosel'skii and Pokrovskii 1989).
+//! `actuator-hysteresis`: an actuator follows its command with play (the play operator of
+//! Krasnosel'skii and Pokrovskii 1989).
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Standing, Values, drives};

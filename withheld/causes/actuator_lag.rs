@@ -1,4 +1,6 @@
-//! `actuator-lag`: a command is followed with a time constant, `T dy/dt = u - y`; exact for a command that holds.
+//! `actuator-lag`: an actuator follows its command with a time constant, `T dy/dt = u - y`.
+//!
+//! The solution is exact for a command that is constant over a step.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, drives};

@@ -1,6 +1,6 @@
 //! `actuator-saturation`: the force of a drive on its joint is limited.
 //!
-//! The size is the share of the largest force that is missing: the limit is `peak (1 - size)`.
+//! The size is the missing share of the largest force: the limit is `peak (1 - size)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, joint_drives};

@@ -1,4 +1,4 @@
-//! `armature`: the inertia of a rotor at a joint.
+//! `armature`: rotor inertia at a joint.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

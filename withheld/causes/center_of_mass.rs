@@ -1,4 +1,4 @@
-//! `center-of-mass`: the centre of a body lies elsewhere, in a direction that is drawn.
+//! `center-of-mass`: the centre of mass of a body is shifted in a drawn direction.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

@@ -1,4 +1,5 @@
-//! `constant-force`: wind, or a bias: a force at the centre of mass that keeps its direction in the world.
+//! `constant-force`: wind or a bias, as a force at the centre of mass with a constant direction in
+//! the world.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

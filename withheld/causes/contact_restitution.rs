@@ -1,4 +1,4 @@
-//! `contact-restitution`: a contact is damped otherwise, so that it bounces higher or lower.
+//! `contact-restitution`: a contact has another damping, so that bodies bounce higher or lower.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

@@ -1,4 +1,4 @@
-//! `contact-stiffness`: a contact gives way otherwise.
+//! `contact-stiffness`: a contact has another stiffness.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

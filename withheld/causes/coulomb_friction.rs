@@ -1,7 +1,7 @@
 //! `coulomb-friction`: dry friction of a joint, in half of the cases larger in one direction.
 //!
-//! A friction of `force + offset` in the positive direction and of `force - offset` in the other is a
-//! symmetric one and a constant force of `-offset`, in motion as at rest.
+//! The friction is `force + offset` in the positive direction and `force - offset` in the other.
+//! This equals symmetric friction plus a constant force of `-offset`, in motion and at rest.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

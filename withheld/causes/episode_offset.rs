@@ -1,4 +1,5 @@
-//! `episode-offset`: a reading has a shift of its own in each episode: a zero that is found anew at each start.
+//! `episode-offset`: a reading has another constant shift in each episode, as if its zero were
+//! found anew at each start.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Standing, Values};

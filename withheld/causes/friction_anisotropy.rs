@@ -1,5 +1,5 @@
-//! `friction-anisotropy`: sliding friction differs by direction, by `1 + a cos 2f + b sin 2f`, `f` the
-//! direction of the velocity.
+//! `friction-anisotropy`: sliding friction depends on the direction of the velocity, by the factor
+//! `1 + a cos 2f + b sin 2f` of its angle `f`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

@@ -1,4 +1,4 @@
-//! `friction-drift`: sliding friction grows during an episode, by `1 + rate t`.
+//! `friction-drift`: sliding friction grows during an episode, by the factor `1 + rate t`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

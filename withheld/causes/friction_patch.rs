@@ -1,4 +1,4 @@
-//! `friction-patch`: sliding friction is another one beyond a place, over four millimetres.
+//! `friction-patch`: sliding friction changes beyond a place, over an edge of four millimetres.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

@@ -1,4 +1,5 @@
-//! `friction-trend`: sliding friction is `1 + rate n` times as large in episode `n`: a board that wears.
+//! `friction-trend`: in episode `n` sliding friction is `1 + rate n` times as large, as on a board
+//! that wears.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Standing, Values};

@@ -1,6 +1,6 @@
-//! `geometry`: a link is longer or shorter, or a joint's axis stands askew.
+//! `geometry`: a link is longer or shorter, or a joint's axis is tilted.
 //!
-//! The size is a length in m, or an angle in rad where the fourth draw is above a half.
+//! The size is a length in m, or an angle in rad if the fourth draw is above a half.
 
 use crate::anatomy::{Anatomy, JointKind};
 use crate::cause::{Cause, Place, Standing, Values};
@@ -46,7 +46,7 @@ impl Cause for Geometry {
         if let Some(element) = world.document.find_mut("joint", joint)
             && let [a, b, c] = element.numbers("axis")[..]
         {
-            // A small turn of the axis about the direction drawn.
+            // Rotates the axis by a small angle about the drawn direction.
             let turned = [
                 a + size * (y * c - z * b),
                 b + size * (z * a - x * c),

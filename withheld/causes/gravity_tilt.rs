@@ -1,4 +1,5 @@
-//! `gravity-tilt`: the ground is not level. Gravity turns by two angles and keeps its length.
+//! `gravity-tilt`: the ground is not level. Gravity is rotated by two angles and keeps its
+//! magnitude.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

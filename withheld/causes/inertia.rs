@@ -1,4 +1,4 @@
-//! `inertia`: the moments of a body about its centre are larger or smaller, in proportion.
+//! `inertia`: the moments of inertia of a body about its centre are scaled by one factor.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

@@ -1,4 +1,4 @@
-//! `joint-stiffness`: a spring, a cable or a hose beside a joint, `-k (q - rest)`.
+//! `joint-stiffness`: a spring, a cable or a hose acts in parallel with a joint, `-k (q - rest)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

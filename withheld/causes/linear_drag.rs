@@ -1,4 +1,4 @@
-//! `linear-drag`: a force at the centre of mass against its velocity, `-c v`.
+//! `linear-drag`: a force at the centre of mass opposes its velocity, `-c v`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

@@ -1,4 +1,4 @@
-//! `load-friction`: dry friction in proportion to the force that the drive transmits.
+//! `load-friction`: dry friction proportional to the force that the drive transmits.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, driven_joints};

@@ -1,4 +1,4 @@
-//! `magnus`: a spinning body is pushed aside, `c w x v`.
+//! `magnus`: a force pushes a spinning body sideways, `c w x v`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, free_bodies};

@@ -1,4 +1,4 @@
-//! `mass`: a body is heavier or lighter; its moments of inertia with it.
+//! `mass`: a body is heavier or lighter, and its moments of inertia scale with it.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

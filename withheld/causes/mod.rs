@@ -1,5 +1,7 @@
-//! The causes, one file each: the catalogue's in its order, those whose names are agreed on, and last
-//! those of no catalogue.
+//! The causes, one file each.
+//!
+//! First come those of the catalogue in its order, then those with agreed names, last those of no
+//! catalogue.
 
 use crate::cause::Cause;
 
@@ -134,7 +136,7 @@ pub const ALL: &[&dyn Cause] = &[
     &unknown_encoder_eccentricity::EncoderEccentricity,
 ];
 
-/// The cause of a name.
+/// The cause of that name.
 #[must_use]
 pub fn named(name: &str) -> Option<&'static dyn Cause> {
     ALL.iter().copied().find(|c| c.name() == name)

@@ -1,4 +1,4 @@
-//! `payload`: a body carries a mass more, spread as its own.
+//! `payload`: a body carries added mass with the same distribution as its own.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

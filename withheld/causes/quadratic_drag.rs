@@ -1,4 +1,4 @@
-//! `quadratic-drag`: a force at the centre of mass against its velocity, `-c |v| v`.
+//! `quadratic-drag`: a force at the centre of mass opposes its velocity, `-c |v| v`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};

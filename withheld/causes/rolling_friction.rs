@@ -1,4 +1,4 @@
-//! `rolling-friction`: the friction of a contact against rolling has another coefficient.
+//! `rolling-friction`: the rolling friction of a contact has another coefficient.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

@@ -1,4 +1,4 @@
-//! `sensor-bias`: a reading is shifted; of a vector in a direction that is drawn.
+//! `sensor-bias`: a reading is shifted by a constant; a vector is shifted in a drawn direction.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, sensors};

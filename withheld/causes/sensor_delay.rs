@@ -1,6 +1,7 @@
-//! `sensor-delay`: a reading is old.
+//! `sensor-delay`: a reading arrives late.
 //!
-//! Before the episode the machine is taken to have moved as at its start: the first readings are those of a straight line.
+//! Before the episode the machine is assumed to have moved as at its start: the first readings lie
+//! on a straight line.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, sensors};

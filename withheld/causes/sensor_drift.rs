@@ -1,4 +1,4 @@
-//! `sensor-drift`: a reading grows slowly, by `rate t`; `t` begins with each episode.
+//! `sensor-drift`: a reading drifts slowly, by `rate t`; `t` begins at 0 in each episode.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, sensors};

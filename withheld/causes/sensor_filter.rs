@@ -1,4 +1,5 @@
-//! `sensor-filter`: a reading passes a low pass of the first order, `T dy/dt = r - y`, that is at rest at the start.
+//! `sensor-filter`: a reading passes through a first-order low-pass filter, `T dy/dt = r - y`,
+//! which is at rest at the start.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, sensors};
@@ -11,7 +12,7 @@ struct LowPass(f64);
 
 impl ReadingPath for LowPass {
     fn distort(&self, values: &mut [f64], dt: f64, _episode: usize) {
-        // Exact for a reading that goes on lines between time steps.
+        // Exact for a reading that is linear between time steps.
         let (x, decay) = (dt / self.0, (-dt / self.0).exp());
         let share = (1.0 - decay) / x;
         let (mut filtered, mut before) = (values[0], values[0]);

@@ -1,4 +1,4 @@
-//! `sensor-quantization`: a reading is the nearest multiple of a step, its noise included.
+//! `sensor-quantization`: a reading, noise included, is rounded to the nearest multiple of a step.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, sensors};
@@ -19,7 +19,7 @@ impl Cause for SensorQuantization {
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
         for column in place.columns() {
-            // Of two such sensors in a row the coarser one is what is seen.
+            // If two such causes act on one column, only the coarser step is visible.
             world.steps.retain(|(c, step)| *c != column || *step > size);
             if !world.steps.iter().any(|(c, _)| *c == column) {
                 world.steps.push((column, size));

@@ -1,4 +1,4 @@
-//! `sensor-scale`: a reading is multiplied.
+//! `sensor-scale`: a reading is multiplied by a factor.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, sensors};

@@ -1,4 +1,5 @@
-//! `sensor-trend`: a reading is off by `step n`, `n` the number of the episode: a mounting that gives way, a tape that stretches.
+//! `sensor-trend`: in episode `n` a reading is shifted by `step n`, as by a mounting that gives way
+//! or a tape that stretches.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Standing, Values, sensors};

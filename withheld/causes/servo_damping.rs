@@ -1,4 +1,4 @@
-//! `servo-damping`: the gain `kv` of a servo is another one.
+//! `servo-damping`: a servo has another gain `kv`.
 
 use crate::anatomy::{Anatomy, DriveKind};
 use crate::cause::{Cause, Place, Standing, Values};

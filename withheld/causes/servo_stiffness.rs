@@ -1,4 +1,4 @@
-//! `servo-stiffness`: the gain `kp` of a servo is another one.
+//! `servo-stiffness`: a servo has another gain `kp`.
 
 use crate::anatomy::{Anatomy, DriveKind};
 use crate::cause::{Cause, Place, Standing, Values};

@@ -1,6 +1,6 @@
 //! `stribeck-friction`: dry friction that is largest at rest, `c + b exp(-(v / s)²)`.
 //!
-//! The size is `c + b`, of which `b` is between four and eight tenths.
+//! The size is `c + b`; the share of `b` is between four and eight tenths.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

@@ -1,4 +1,4 @@
-//! `supply-drift`: the gain of a drive changes over an episode, `1 + rate t`.
+//! `supply-drift`: the gain of a drive changes during an episode, by the factor `1 + rate t`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Standing, Values, drives};

@@ -1,4 +1,5 @@
-//! `supply-trend`: the gain of a drive is `1 + rate n` in episode `n`: a battery that empties over an afternoon.
+//! `supply-trend`: in episode `n` the gain of a drive is `1 + rate n`, as with a battery that
+//! drains over an afternoon.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Standing, Values, drives};

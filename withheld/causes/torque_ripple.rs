@@ -1,4 +1,4 @@
-//! `torque-ripple`: a torque that repeats with the angle, `a sin(n q) + b cos(n q)`.
+//! `torque-ripple`: a torque that is periodic in the angle, `a sin(n q) + b cos(n q)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, hinges};
@@ -8,7 +8,7 @@ use crate::world::{Force, World};
 /// The cause.
 pub struct TorqueRipple;
 
-/// Periods in a turn.
+/// Periods per turn.
 const TEETH: [f64; 8] = [3.0, 4.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0];
 
 struct Ripple {

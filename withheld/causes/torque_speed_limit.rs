@@ -1,7 +1,8 @@
-//! `torque-speed-limit`: the largest force of a drive falls with speed, `F (1 - |v| / v0)`, as that of a motor on a
-//! battery does.
+//! `torque-speed-limit`: the largest force of a drive falls with speed, `F (1 - |v| / v0)`, as in a
+//! motor on a battery.
 //!
-//! The size says how near the limit comes: `v0` is the typical speed over the size, `F` the largest force that was needed.
+//! The size says how close the limit comes: `v0` is the typical speed divided by the size. `F` is
+//! the largest force that the machine needed.
 
 use crate::anatomy::{Anatomy, DriveKind};
 use crate::cause::{Cause, Place, Standing, Values, joint_drives};
@@ -16,7 +17,7 @@ struct Limit {
     kind: DriveKind,
     /// `kp`, `kv`, gear.
     gains: [f64; 3],
-    /// Places of position and velocity.
+    /// Indices of position and velocity.
     at: [usize; 2],
     force: f64,
     speed: f64,
@@ -30,7 +31,7 @@ impl Force for Limit {
         let share = (1.0 - sim.qvel()[v].abs() / self.speed).max(0.0);
         let most = self.force * share / gear.abs();
         let command = sim.ctrl()[self.actuator];
-        // The command that gives the limited force.
+        // Sends the command that gives the limited force.
         sim.ctrl()[self.actuator] = match self.kind {
             DriveKind::Position => {
                 let force = (kp * (command - x) - kv * rate).clamp(-most, most);

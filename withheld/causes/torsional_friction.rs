@@ -1,4 +1,4 @@
-//! `torsional-friction`: the friction of a contact against spin has another coefficient.
+//! `torsional-friction`: the torsional friction of a contact has another coefficient.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

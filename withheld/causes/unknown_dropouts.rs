@@ -1,4 +1,5 @@
-//! `unknown:dropouts`: every 0.4 s on average commands are lost for a while, and the last one holds.
+//! `unknown:dropouts`: every 0.4 s on average commands are lost for a while, and the last one is
+//! held.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, drives};
@@ -28,7 +29,7 @@ impl CommandPath for Lost {
         let time = self.step as f64 * self.dt;
         self.step += 1;
         let slot = (time / BETWEEN) as u64;
-        // A loss begins at a place of its own within each slot of time.
+        // A loss begins at a random time within each interval of `BETWEEN`.
         let digest = crate::random::digest(self.seed, &["dropout", &slot.to_string()]);
         let begins = BETWEEN * f64::from(digest[0]) / 256.0;
         let within = time - slot as f64 * BETWEEN;

@@ -1,4 +1,5 @@
-//! `unknown:encoder-eccentricity`: the disc of an encoder does not turn about its centre, `r + a sin(n r + p)`.
+//! `unknown:encoder-eccentricity`: the disc of an encoder does not rotate about its centre, `r + a
+//! sin(n r + p)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};
@@ -7,7 +8,7 @@ use crate::world::{ReadingPath, World};
 /// The cause.
 pub struct EncoderEccentricity;
 
-/// Phase, rad, of the error over a typical departure of the reading.
+/// The phase, rad, of the error over one standard deviation of the reading is one of these two.
 const WAVES: [f64; 2] = [2.0, 4.0];
 
 struct Eccentric {

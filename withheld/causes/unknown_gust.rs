@@ -1,4 +1,5 @@
-//! `unknown:gust`: a body is pushed once in each episode, at another time each time, for a fifth of a second.
+//! `unknown:gust`: a body is pushed once per episode for a fifth of a second, at another time in
+//! each.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, moving_bodies};
@@ -10,7 +11,7 @@ pub struct Gust;
 
 /// Length of a gust, s.
 const LENGTH: f64 = 0.2;
-/// When it may come, s from the start of a log.
+/// Range of its start, s from the start of a log.
 const WHEN: [f64; 2] = [0.1, 0.7];
 
 struct Push {
@@ -29,7 +30,7 @@ impl Force for Push {
     fn act(&mut self, sim: &mut Sim) {
         let share = (sim.time - self.from) / LENGTH;
         if (0.0..1.0).contains(&share) {
-            // Comes and goes smoothly.
+            // The force rises and falls smoothly.
             let now = (std::f64::consts::PI * share).sin().powi(2);
             sim.push_body(self.body, self.force.map(|f| now * f));
         }

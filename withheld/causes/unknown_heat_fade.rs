@@ -1,6 +1,7 @@
-//! `unknown:heat-fade`: a drive weakens as it warms.
+//! `unknown:heat-fade`: a drive weakens as it heats up.
 //!
-//! `dT/dt = (u / u0)² - T / 2 s`, a gain of `1 / (1 + size T)`; each episode begins cold.
+//! The temperature follows `dT/dt = (u / u0)² - T / 2 s`, and the gain is `1 / (1 + size T)`. Each
+//! episode begins cold.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, drives};
@@ -9,7 +10,7 @@ use crate::world::{CommandPath, World};
 /// The cause.
 pub struct HeatFade;
 
-/// Time in which a drive cools, s.
+/// Time constant with which a drive cools, s.
 const COOLS: f64 = 2.0;
 
 struct Heat {

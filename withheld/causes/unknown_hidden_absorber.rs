@@ -1,6 +1,6 @@
-//! `unknown:hidden-absorber`: a mass on a spring rides on a joint and swings by itself.
+//! `unknown:hidden-absorber`: a mass on a spring is attached to a joint and oscillates by itself.
 //!
-//! Its inertia is the size, its frequency between 2 and 6 Hz, its damping ratio 0.05.
+//! The size is its inertia. Its frequency is between 2 and 6 Hz, its damping ratio 0.05.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

@@ -1,5 +1,8 @@
-//! `unknown:hidden-gyroscope`: a wheel spins inside of a body, `torque = H x w`, `H` its angular momentum, about an axis
-//! that is drawn and stays in the world: the body turns little, or slowly against the wheel.
+//! `unknown:hidden-gyroscope`: a wheel spins inside a body, `torque = H x w` with its angular
+//! momentum `H`.
+//!
+//! Its axis is drawn and stays fixed in the world: the body rotates little, or slowly compared with
+//! the wheel.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, free_bodies};

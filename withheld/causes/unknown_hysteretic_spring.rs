@@ -1,6 +1,7 @@
-//! `unknown:hysteretic-spring`: rubber, whose force depends on how it came there (Bouc 1967, Wen 1976).
+//! `unknown:hysteretic-spring`: rubber, whose force depends on the path (Bouc 1967, Wen 1976).
 //!
-//! `dz/dt = (v - |v| z) / s`, a force of `-F z`: between -1 and 1, turned over a travel of `s`.
+//! The force is `-F z` with `dz/dt = (v - |v| z) / s`. The state `z` stays between -1 and 1 and
+//! reverses over a travel of `s`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

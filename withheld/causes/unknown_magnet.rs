@@ -1,7 +1,7 @@
 //! `unknown:magnet-at-one-angle`: a joint is pulled to one place, and only near it.
 //!
-//! The force is that of a well of Gaussian shape: `-F sqrt(e) (x / w) exp(-x² / 2 w²)`, at most `F` at a
-//! distance of `w`.
+//! The force is that of a well of Gaussian shape: `-F sqrt(e) (x / w) exp(-x² / 2 w²)`. Its maximum
+//! is `F`, at a distance of `w`.
 
 use crate::anatomy::{Anatomy, JointKind};
 use crate::cause::{Cause, Place, Values, scalar_joints};
@@ -39,7 +39,7 @@ impl Cause for Magnet {
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
         let joint = place.joint();
-        // A magnet of a few degrees, or of a few centimetres.
+        // The width is a few degrees, or a few centimetres.
         let width = match joint.kind {
             JointKind::Slide => 0.04,
             _ => 0.12,

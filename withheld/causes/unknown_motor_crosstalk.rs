@@ -1,4 +1,4 @@
-//! `unknown:motor-crosstalk`: a share of one drive's force acts at another joint too.
+//! `unknown:motor-crosstalk`: a share of one drive's force also acts at another joint.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, driven_joints};

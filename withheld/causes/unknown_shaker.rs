@@ -1,4 +1,4 @@
-//! `unknown:shaker`: something near shakes a joint at a frequency of its own, `F sin(2 pi f t + p)`.
+//! `unknown:shaker`: something nearby shakes a joint at its own frequency, `F sin(2 pi f t + p)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

@@ -1,4 +1,6 @@
-//! `unknown:slew-limit`: a command changes at a limited rate; the size is the time in which it changes by its typical departure.
+//! `unknown:slew-limit`: the rate of change of a command is limited.
+//!
+//! The size is the time in which the command can change by its standard deviation.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, drives};

@@ -1,4 +1,4 @@
-//! `unknown:soft-stop`: a spring that acts beyond one place only, as a cable that comes taut.
+//! `unknown:soft-stop`: a spring acts only beyond one position, like a cable that goes taut.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

@@ -1,4 +1,4 @@
-//! `unknown:wind-zone`: a body is pushed as long as it is on one side of a line.
+//! `unknown:wind-zone`: a force pushes a body while it is on one side of a line.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, free_bodies};

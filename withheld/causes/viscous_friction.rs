@@ -1,4 +1,4 @@
-//! `viscous-friction`: a force in proportion to a joint's speed, `-d v`.
+//! `viscous-friction`: a force proportional to a joint's velocity, `-d v`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

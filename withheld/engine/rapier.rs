@@ -1,7 +1,7 @@
-//! rapier as what moves a world: one free body, its mass as the compiled model has it.
+//! Moves one free body by rapier; its mass is that of the compiled model.
 //!
-//! The motion is rapier's alone. MuJoCo is asked for what follows from a state without a law of motion: what sensors
-//! read there, and how fast a body's centre moves.
+//! The motion is rapier's alone. MuJoCo computes only what follows from a state without a law of
+//! motion: the sensors' readings, and the velocity of the body's centre.
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -13,9 +13,11 @@ use rapier3d::geometry::{ColliderBuilder, SharedShape};
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::pipeline::PhysicsWorld;
 
-/// Substeps of a step, in which forces are added: one, since in single precision the rounding of many small increments adds
-/// up. At an eighth of the flight's time step it makes three times the gap that it makes at half
-/// (`cargo run --example machines free-flight`).
+/// Substeps of a step, in which forces are added.
+///
+/// There is only one, because the rounding of many small increments adds up in single precision. At
+/// an eighth of the flight's time step it makes three times the gap that it makes at half (`cargo
+/// run --example machines free-flight`).
 const SUBSTEPS: usize = 1;
 
 /// A free body in rapier.
@@ -50,8 +52,10 @@ fn wide_rotation(q: Rotation) -> UnitQuaternion<f64> {
 }
 
 impl Mover {
-    /// The first body of a model, which has a free joint, at a state: position and quaternion of its frame; velocity of
-    /// that frame's origin in the world, and turning in the frame, as MuJoCo has them.
+    /// The first body of a model, which has a free joint, at a state.
+    ///
+    /// `qpos` is position and quaternion of its frame. `qvel` is the velocity of that frame's
+    /// origin in the world and the angular velocity in the frame, as in MuJoCo.
     pub(super) fn new(model: &MjModel, qpos: &[f64], qvel: &[f64]) -> Self {
         let mut world = PhysicsWorld::new();
         let dt = model.opt().timestep as f32;
@@ -95,7 +99,9 @@ impl Mover {
         }
     }
 
-    /// A step under a force at the centre of mass and a torque, both in the world's frame, N and N m; and the state after it.
+    /// Takes a step under a force at the centre of mass and a torque; returns the state after it.
+    ///
+    /// Force and torque are in the world's frame, N and N m.
     pub(super) fn step(&mut self, wrench: &[f64; 6]) -> ([f64; 7], [f64; 6]) {
         let body = &mut self.world.bodies[self.body];
         body.reset_forces(false);
@@ -116,13 +122,14 @@ impl Mover {
     }
 }
 
-/// A geom that touches, as a shape with its sliding friction; a drop bounces as far as MuJoCo's spring and damper say.
+/// A colliding geom as a shape with its sliding friction. Its restitution follows from MuJoCo's
+/// spring and damper.
 fn collider(model: &MjModel, geom: usize) -> Option<ColliderBuilder> {
     if model.geom_contype()[geom] == 0 {
         return None;
     }
     let [a, b, c] = model.geom_size()[geom].map(|x| x as f32);
-    // Cylinders stand along y in rapier and along z in MuJoCo.
+    // The axis of a cylinder is y in rapier and z in MuJoCo.
     let upright = Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2);
     let (shape, turn) = match model.geom_type()[geom] {
         MjtGeomBase::mjGEOM_PLANE => (SharedShape::halfspace(Vector::Z), Rotation::IDENTITY),
@@ -144,8 +151,10 @@ fn collider(model: &MjModel, geom: usize) -> Option<ColliderBuilder> {
     )
 }
 
-/// Share of its speed with which a body leaves a linear spring and damper, `exp(-pi z / sqrt(1 - z²))`, `z` the damping ratio;
-/// 0 for one that is not given by stiffness and damping, or is damped critically.
+/// Coefficient of restitution of a linear spring and damper, `exp(-pi z / sqrt(1 - z²))` with the
+/// damping ratio `z`.
+///
+/// It is 0 if the contact is not given by stiffness and damping, or is damped critically or more.
 fn restitution([stiffness, damping]: [f64; 2]) -> f64 {
     let ratio = -damping / (2.0 * (-stiffness).max(f64::MIN_POSITIVE).sqrt());
     if stiffness >= 0.0 || ratio >= 1.0 {

@@ -1,7 +1,7 @@
-//! What each machine does without a cause: run time, gap of its time step, readings, forces.
+//! Prints what each machine does without a cause: run time, gap of its time step, readings, forces.
 //!
-//! `cargo run --release -p asid-withheld --example machines [NAME…] [DIR]`; the machines of others come from a folder that
-//! `withheld/models/fetch.py` filled.
+//! `cargo run --release -p asid-withheld --example machines [NAME…] [DIR]`; machines of other
+//! authors come from a folder that `withheld/models/fetch.py` filled.
 
 use std::io::Write as _;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! A stone that slides over a sheet, turning as it goes.
+//! A stone that slides over a sheet and turns at the same time.
 
 use crate::machine::{Contact, Half, Machine, Shows, fit, start};
 

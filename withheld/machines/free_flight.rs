@@ -1,4 +1,4 @@
-//! An uneven body that is thrown and tumbles; cameras see its pose.
+//! An asymmetric body that is thrown and tumbles; cameras measure its pose.
 
 use crate::machine::{Half, Machine, fit, start};
 

@@ -1,4 +1,4 @@
-//! A motor that lifts a load on a beam through a gear of 40.
+//! A motor that lifts a load on a beam through a gear with a ratio of 40.
 
 use crate::machine::{Half, Machine, fit, sines, start};
 

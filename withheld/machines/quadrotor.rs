@@ -1,4 +1,4 @@
-//! A small quadrotor for a second and a half about hovering.
+//! A small quadrotor near hover for a second and a half.
 
 use crate::machine::{Half, Machine, fit, sines, start};
 

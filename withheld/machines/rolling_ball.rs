@@ -1,4 +1,4 @@
-//! A ball that is dropped onto a floor at a speed, bounces and rolls on.
+//! A ball that is thrown onto a floor, bounces and rolls on.
 
 use crate::machine::{Contact, Half, Machine, Shows, start};
 

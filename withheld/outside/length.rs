@@ -1,7 +1,8 @@
-//! How long an episode of a machine that others modelled is: as long as its own time step can tell what it does.
+//! Episode length of a machine that other authors modelled: as long as its time step resolves the
+//! motion.
 //!
-//! An arm with motors that do not hold it up falls into its stops, and what it does from there on depends on the last
-//! digit. Before that it is as good a machine as any.
+//! An arm whose motors do not hold it up falls into its stops. From there on its motion depends on
+//! the last digit. Before that it is as good a machine as any.
 
 use crate::anatomy::Anatomy;
 use crate::error::Result;
@@ -10,18 +11,21 @@ use crate::motion::{Motion, Style};
 use crate::random::stream;
 use crate::world::World;
 
-/// Lengths that are tried, s, the longest first. The shortest still has 50 rows at the usual rate.
+/// Lengths that are tried, s, longest first. The shortest still has 50 rows at the usual rate.
 const LENGTHS: [f64; 3] = [1.5, 0.75, 0.5];
-/// Gap that the time step may make, in noise floors: half of that by which a case is left out, since cases draw other motions
-/// and lengths of up to 1.3 times these.
+/// Gap that the time step may make, in noise floors.
+///
+/// It is half of the limit at which a case is left out, because cases draw other motions and
+/// lengths of up to 1.3 times these.
 const STEP_GAP: f64 = 0.25;
-/// Episodes that it is measured in: as many as a world is checked by.
+/// Episodes in which the gap is measured: as many as those by which a world is checked.
 const EPISODES: usize = 3;
-/// Integrator that it is measured with: the one that differs least between steps.
+/// Integrator with which the gap is measured: the one that differs least between steps.
 const INTEGRATOR: &str = "implicitfast";
 
-/// The longest length at which half the time step changes the readings by little; the shortest where none does, so
-/// that the rules for all cases decide.
+/// The longest length at which half the time step changes the readings only a little.
+///
+/// If there is none, it is the shortest length, and the rules for all cases decide.
 pub(super) fn of(anatomy: &Anatomy) -> f64 {
     let step = anatomy.timestep;
     for seconds in LENGTHS {
@@ -40,7 +44,7 @@ pub(super) fn of(anatomy: &Anatomy) -> f64 {
             let mut coarse = World::new(anatomy, &[], step, INTEGRATOR)?;
             Ok(bench.distance(&bench.run(&mut coarse)?, &bench.clean))
         };
-        // A simulation that leaves all bounds is no gap that is small.
+        // A simulation that diverges does not count as a small gap.
         if gap().is_ok_and(|gap| gap < STEP_GAP) {
             return seconds;
         }

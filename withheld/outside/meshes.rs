@@ -1,15 +1,19 @@
-//! Meshes of a model that others wrote: they are left out where no mass is drawn from them.
+//! Leaves out the meshes of a model of other authors, unless a body gets its mass from them.
 //!
-//! A mesh is a file beside the model, which a study does not carry. What it is there for is its look, its contacts and, where
-//! a body has no `<inertial>`, its mass. Without meshes such a machine touches with its other geoms alone.
+//! A mesh is a file beside the model, and a study does not carry it. It gives a body its look, its
+//! contacts and, without an `<inertial>`, its mass. Without meshes such a machine touches with its
+//! other geoms alone.
 
 use crate::document::Element;
 
-/// Leaves out the meshes of bodies that have an `<inertial>`, and of parts that no joint of their own moves: what stands
-/// on the ground has no use for a mass, and a fixed part of a moving body is there without its own.
+/// Removes all meshes from the bodies of a model.
+///
+/// A body without an `<inertial>` and without a joint of its own loses the mass of its meshes. A
+/// body fixed to the ground needs no mass; a fixed part of a moving body stays without its own
+/// mass.
 ///
 /// # Errors
-/// A sentence on the first mesh that a body with a joint has its mass from.
+/// Returns a sentence on the first mesh that gives its mass to a body with a joint.
 pub(super) fn leave_out(document: &mut Element) -> Result<(), String> {
     match document.find_mut("worldbody", None) {
         Some(world) => clear(world),

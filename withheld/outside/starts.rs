@@ -1,4 +1,5 @@
-//! Where a machine that others modelled starts: about its reference, within its limits, and with its loops closed.
+//! Initial states of a machine that other authors modelled: about its reference, within its limits,
+//! and with its loops closed.
 
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 
@@ -6,13 +7,15 @@ use crate::anatomy::{Anatomy, JointKind};
 use crate::engine;
 use crate::machine::Start;
 
-/// Spread of positions and of velocities at the start, rad or m, and rad/s or m/s: a few degrees, far above the noise and
-/// far below what joints move by.
+/// Spread of initial positions (rad or m) and velocities (rad/s or m/s).
+///
+/// A few degrees: far above the noise and far below the joints' motion.
 const SPREAD: [f64; 2] = [0.05, 0.1];
-/// Largest share of a joint's range that its positions at the start spread over, to each side.
+/// Largest spread of a joint's initial positions to each side, as a share of the joint's range.
 const OF_RANGE: f64 = 0.25;
 
-/// Starts of all hinges and slides; those of a loop stay at the reference, which closes it.
+/// Initial states of all hinges and slides; joints of a loop stay at the reference, which closes
+/// it.
 pub(super) fn of(anatomy: &Anatomy, model: &MjModel) -> Vec<Start> {
     let looped = looped(model);
     let scalar = anatomy.joints.iter().filter(|j| j.kind != JointKind::Free);
@@ -34,7 +37,10 @@ pub(super) fn of(anatomy: &Anatomy, model: &MjModel) -> Vec<Start> {
         .collect()
 }
 
-/// Of each joint, whether an equality ties it: by name, or because it lies between two bodies that are tied to each other.
+/// For each joint, whether an equality constraint ties it.
+///
+/// The constraint names the joint, or the joint lies between two bodies that are tied to each
+/// other.
 fn looped(model: &MjModel) -> Vec<bool> {
     let mut looped = vec![false; model.jnt_bodyid().len()];
     let (first, second) = (model.eq_obj1id(), model.eq_obj2id());
@@ -63,7 +69,7 @@ fn looped(model: &MjModel) -> Vec<bool> {
     looped
 }
 
-/// A body and all that carry it.
+/// A body and all its ancestors.
 fn chain(model: &MjModel, body: usize) -> Vec<i32> {
     let mut all = vec![i32::try_from(body).unwrap_or(0)];
     while let Some(&last) = all.last().filter(|&&b| b > 0) {

@@ -1,25 +1,25 @@
-//! What kinds of cases there are.
+//! The kinds of cases.
 
 use serde::{Deserialize, Serialize};
 
-/// What a case's causes are.
+/// Kind of a case, by its causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// None.
+    /// No cause.
     None,
-    /// One.
+    /// One cause.
     Single,
-    /// Two or three, of which viscous and dry friction of one joint are the commonest.
+    /// Two or three causes; viscous and dry friction of one joint are the most common.
     Several,
-    /// One at all places of a kind.
+    /// One cause at all sites of a machine.
     Group,
-    /// One of no catalogue.
+    /// One cause of no catalogue.
     Unknown,
 }
 
 impl Kind {
-    /// All.
+    /// All kinds.
     pub const ALL: [Self; 5] = [
         Self::None,
         Self::Single,
@@ -40,7 +40,7 @@ impl Kind {
         }
     }
 
-    /// What it is, in words.
+    /// Description in words.
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {
@@ -52,7 +52,7 @@ impl Kind {
         }
     }
 
-    /// The kind of a name; pairs and triples are several.
+    /// The kind of that name; `pair` and `triple` are `Several`.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         match name {

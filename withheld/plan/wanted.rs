@@ -1,4 +1,4 @@
-//! A set for one question: of the wheels' cases only some kinds, causes, worlds and sizes.
+//! Restricts a set to some kinds, causes, worlds and sizes, for one question.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,15 +11,20 @@ use crate::label::Label;
 /// Which cases of the wheels a set takes. The default takes all.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wanted {
-    /// Kinds; all where there is none.
+    /// Kinds; empty stands for all.
     pub kinds: Vec<Kind>,
-    /// Names of causes, of which a case has at least one; all cases where there is none.
+    /// Names of causes, of which a case has at least one; empty stands for all cases.
     pub causes: Vec<String>,
-    /// Clean worlds (`false`) or dirty ones (`true`); both where it is none.
+    /// Clean worlds (`false`) or dirty ones (`true`); `None` stands for both.
     pub dirty: Option<bool>,
-    /// Least size that causes are planned for: an excess gap in noise floors in clean worlds, how often that of the dirt in dirty ones.
+    /// Minimum size for which causes are planned.
+    ///
+    /// In clean worlds it is an excess gap in noise floors, in dirty ones a multiple of the gap of
+    /// the dirt.
     pub size: f64,
-    /// What is wrong with the logs of every case; faults as dealt where it is none. The same seed makes the same worlds with another fault.
+    /// Fault of the logs of every case; `None` stands for faults as dealt.
+    ///
+    /// The same seed with another fault of the log makes the same worlds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fault: Option<Fault>,
 }
@@ -34,7 +39,7 @@ impl Wanted {
     /// Refuses what no wheel has.
     ///
     /// # Errors
-    /// Where a cause is none.
+    /// If a name is not that of a cause.
     pub fn check(&self) -> Result<()> {
         let known = |name: &str| causes::ALL.iter().any(|c| c.name() == name);
         match self.causes.iter().find(|name| !known(name)) {
@@ -53,7 +58,7 @@ impl Wanted {
         self.causes.is_empty() || self.causes.iter().any(|c| c == name)
     }
 
-    /// Whether a slot is one of these.
+    /// Whether the set takes a slot.
     #[must_use]
     pub fn takes(&self, slot: &Slot) -> bool {
         let caused = slot.kind == Kind::None || slot.aim(0) >= self.size;
@@ -74,7 +79,8 @@ impl Wanted {
         }
     }
 
-    /// Whether a case that was made is one of these: where a cause could not be sized another one was drawn.
+    /// Whether the set takes a finished case: if a cause could not reach its size, another one was
+    /// drawn.
     #[must_use]
     pub fn takes_label(&self, label: &Label) -> bool {
         let mut names = label

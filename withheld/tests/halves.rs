@@ -1,4 +1,4 @@
-//! Which machines and causes there are, in which half, and what a plan of 600 cases holds.
+//! Which machines and causes there are, their halves, and what a plan of 600 cases holds.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use asid_withheld::faults::Fault;
 use asid_withheld::plan::{FACTORS, GAPS, Kind, Plan, Slot, Wanted, possible};
 use asid_withheld::{Half, Result, causes, machines};
 
-/// The split by kind of machine, as it is written down in `docs/withheld.md`.
+/// The machines of the training half, as in `docs/withheld.md`.
 const TRAINING: [&str; 9] = [
     "servo",
     "belt-slide",
@@ -135,7 +135,7 @@ fn each_half_of_600_cases_keeps_its_quotas() -> Result<()> {
         assert!(count(&|s| s.little) >= 25);
         assert!(count(&|s| s.kind == Kind::Several) >= 50);
         assert!(count(&|s| s.kind == Kind::Group) >= 30);
-        // Every cause that a machine of the half can have comes up, and in clean worlds at each gap.
+        // Every cause that a machine of the half can have occurs, and in clean worlds at each gap.
         let mut levels: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
         for slot in &plan.slots {
             for cause in &slot.causes {

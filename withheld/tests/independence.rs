@@ -1,4 +1,4 @@
-//! The stick shares no code with what it measures.
+//! The generator shares no code with what it measures.
 
 #[path = "../../tests/manifests/mod.rs"]
 mod manifests;
@@ -8,7 +8,7 @@ use std::path::Path;
 
 use manifests::{assert_unused, dependencies};
 
-/// What the generator may depend on: the engines, and crates of no robotics.
+/// Permitted dependencies of the generator: the engines, and crates that are not about robotics.
 const ALLOWED: [&str; 12] = [
     "mujoco-rs",
     "nalgebra",

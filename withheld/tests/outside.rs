@@ -1,4 +1,5 @@
-//! Models that others wrote: what is a machine, and what is refused in a sentence that names the element.
+//! Models of other authors: which become machines, and which are refused with the name of the
+//! element.
 
 use asid_withheld::anatomy::Anatomy;
 use asid_withheld::case;
@@ -23,7 +24,7 @@ fn names_with_slashes_spaces_and_dots_are_names() {
     let anatomy = Anatomy::of(machine).expect("a model");
     assert_eq!(anatomy.joints[0].name, "a/joint 1");
     assert_eq!(anatomy.bodies, ["world", "a/b c.d"]);
-    // The middle of the range, and a part of it.
+    // The middle of the range, and a share of it.
     let command = machine.commands[0];
     assert!((command.center - 1.0).abs() < 1e-12 && (command.amplitude - 1.2).abs() < 1e-12);
 }
@@ -31,7 +32,7 @@ fn names_with_slashes_spaces_and_dots_are_names() {
 #[test]
 fn what_cannot_be_a_machine_is_refused_by_the_name_of_its_element() {
     for (inside, name) in [
-        // A body whose mass would come from the mesh.
+        // A body that would get its mass from the mesh.
         (r#"<geom name="shell" type="mesh" mesh="m"/>"#, "`shell`"),
         (r#"<geom name="cast" mesh="m"/>"#, "`cast`"),
         (
@@ -47,7 +48,7 @@ fn what_cannot_be_a_machine_is_refused_by_the_name_of_its_element() {
 
 #[test]
 fn meshes_are_left_out_where_no_mass_comes_from_them() {
-    // A body with an <inertial>, a fixed part of it, and what stands on the ground.
+    // A body with an `<inertial>`, a fixed part of it, and a body fixed to the ground.
     let inside = r#"<inertial pos="0 0 0.1" mass="0.7" diaginertia="0.01 0.01 0.01"/>
         <geom name="shell" type="mesh" mesh="m"/><geom name="pad" size="0.02"/>
         <body name="cover"><geom name="lid" type="mesh" mesh="m"/></body>
@@ -57,11 +58,12 @@ fn meshes_are_left_out_where_no_mass_comes_from_them() {
     let anatomy = Anatomy::of(machine).expect("a model");
     assert_eq!(anatomy.geoms, ["pad"]);
     let compiled = asid_withheld::engine::compile(machine.model).expect("a model");
-    // The world, the body with what the document says, its fixed part, the table.
+    // The world, the body with the document's mass, its fixed part, the table.
     assert_eq!(compiled.body_mass(), [0.0, 0.7, 0.0, 0.0]);
 }
 
-/// Two fingers over a coupler, whose tips are tied, and a slide whose range does not hold its reference.
+/// Two fingers over a coupler with tied tips, and a slide whose range does not contain its
+/// reference.
 const LINKAGE: &str = r#"<mujoco model="package/linkage"><compiler angle="degree"/><option timestep="0.001"/>
     <default><geom type="sphere" size="0.02"/></default><worldbody><body name="base">
     <joint name="wrist" range="-90 90"/><geom/>
@@ -89,7 +91,7 @@ fn a_machine_starts_within_its_limits_and_with_its_loops_closed() {
 
 #[test]
 fn an_episode_is_as_long_as_the_time_step_can_tell_the_motion() {
-    // A damped joint; and an arm of three links without friction that is thrown about by a motor.
+    // A damped joint, and an arm of three links without friction that a motor throws about.
     let calm = model(r#"<geom size="0.1"/>"#).replace("axis=", "damping=\"1\" axis=");
     let link = r#"<geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.2"/>"#;
     let joint = r#"<joint type="hinge" axis="0 1 0"/>"#;
@@ -120,7 +122,7 @@ fn a_study_gives_the_noise_of_a_sensor_whatever_its_name() {
     let noise = (1..20)
         .find_map(given)
         .expect("a case whose study gives the noise");
-    // A bare key of TOML has no slash and no space.
+    // A bare key of TOML must not have a slash or a space.
     assert_eq!(noise, "\"q_a/joint 1\" = 0.003\n");
 }
 

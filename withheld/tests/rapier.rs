@@ -53,7 +53,8 @@ fn a_body_without_spin_falls_along_a_parabola() {
     );
     for row in 0..ROWS {
         let t = row as f64 * 0.01;
-        // Semi-implicit Euler falls by g t h / 2 more; single precision adds a tenth of a millimetre at most.
+        // Semi-implicit Euler falls by `g t h / 2` more. Single precision adds at most a tenth of a
+        // millimetre.
         let expected = [v[0] * t, v[1] * t, z + v[2] * t - G * t * (t + STEP) / 2.0];
         for (axis, expected) in expected.into_iter().enumerate() {
             let found = record.at(0, t, axis);
@@ -116,7 +117,7 @@ fn both_engines_move_a_tumbling_body_alike() {
         .collect();
     let bench = Bench::new(&anatomy, &[0.2], &motions, STEP, "implicitfast").expect("a bench");
     let by_rapier = bench.run(&mut world(&anatomy)).expect("a run");
-    // Of the noise: half of it is what a case may have.
+    // In units of the noise; a case may have a gap of 0.5.
     let gap = bench.distance(&by_rapier, &bench.clean);
     assert!(gap > 0.0 && gap < 0.15, "{gap}");
 }
@@ -124,7 +125,7 @@ fn both_engines_move_a_tumbling_body_alike() {
 #[test]
 fn cases_of_both_engines_are_made_and_are_the_same_bytes_again() {
     let plan = Plan::draw(Half::Test, 2, 200, &[]).expect("a plan");
-    // Those without causes are made in one run each.
+    // Cases without causes take one run each.
     let flights: Vec<usize> = (0..plan.slots.len())
         .filter(|&i| plan.machines[plan.slots[i].machine].machine.name == "free-flight")
         .filter(|&i| plan.slots[i].kind == Kind::None && !plan.slots[i].dirty)

@@ -60,14 +60,14 @@ fn a_ball_is_free_until_it_has_fallen_to_the_floor() {
         |_| 0.0,
     );
     assert_eq!(found.len(), 2 * ROWS);
-    // sqrt(2 h / g), to a row.
+    // The ball lands at sqrt(2 h / g), known to one row.
     let lands = ((2.0 * drop / G).sqrt() * 100.0).ceil() as usize;
     for (row, both) in found.chunks_exact(2).enumerate() {
         let expected = match row {
             // Three hundredths of the episode.
             0..4 => "start",
             r if r < lands => "free",
-            // It gives way and lies there.
+            // The contact gives way, and the ball stays on the ground.
             r if r > lands + 1 => "contact ball/world",
             _ => continue,
         };
@@ -83,10 +83,12 @@ const PENDULUM: &str = r#"<mujoco><option timestep="0.001"/><worldbody><body nam
 fn a_pendulum_turns_round_twice_in_a_period() {
     let anatomy = machine(PENDULUM, &[("q", 0.001)]);
     let found = regimes(&anatomy, &[0.05], |_| 0.0);
-    // A period of 2 pi sqrt(l / g) is 1.003 s: it turns round at half a period, and at the end of the episode.
+    // The period 2 pi sqrt(l / g) is 1.003 s. The pendulum reverses after half a period and at the
+    // end of the episode.
     let half = std::f64::consts::PI * (0.25 / G).sqrt() * 100.0;
     for (row, regime) in found.iter().enumerate() {
-        // Speed is sin(pi t / T) of the largest: below 0.03 for 0.03 / pi of half a period, half a row, to each side.
+        // The speed is sin(pi t / T) of the largest, with half a period T. It is below 0.03 for
+        // 0.03 / pi of T, half a row, to each side.
         let near = (row as f64 - half).abs();
         match regime.as_str() {
             "reversal" => assert!(near < 1.0, "row {row}"),
@@ -105,7 +107,8 @@ const SERVO: &str = r#"<mujoco><option timestep="0.001" gravity="0 0 0"/><worldb
 #[test]
 fn a_servo_is_saturated_while_its_error_asks_for_more_than_its_force() {
     let anatomy = machine(SERVO, &[("q", 0.001)]);
-    // It holds its place, then is told to go by 3 rad, where 2 N m / 10 N m/rad are its limit.
+    // The servo holds its position, then gets a step of 3 rad. It saturates beyond 2 N m / 10 N
+    // m/rad.
     let found = regimes(&anatomy, &[0.0], |row| if row < 50 { 0.0 } else { 3.0 });
     assert!(found[4..49].iter().all(|r| r == "standing"), "{found:?}");
     assert!(found[51..60].iter().all(|r| r == "saturated"), "{found:?}");

@@ -1,4 +1,5 @@
-//! A set of cases: the same bytes from the same seed, sealed, and nothing of a label beside the studies.
+//! A set of cases: the same seed gives the same bytes, the set is sealed, and no label shows beside
+//! the studies.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use asid_withheld::plan::Wanted;
 use asid_withheld::seal::{Seal, commitment, digest, verify};
 use asid_withheld::{Half, Result};
 
-/// Cases of the set that is made here.
+/// Number of cases in the set of this test.
 const COUNT: usize = 6;
 
 fn order(seed: u64) -> Order {
@@ -29,7 +30,7 @@ fn made(folder: &Path, seed: u64, threads: usize) -> Result<()> {
     Ok(())
 }
 
-/// All files below a folder, by their path in it.
+/// All files below a folder, by their relative path.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut left = vec![folder.to_owned()];
@@ -61,13 +62,14 @@ fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
     assert!(files(&a) == files(&b), "two runs of one seed differ");
     reveals_nothing(&a);
     for (case, label) in labels(&a) {
-        // Shares of a whole, and a target that each cause alone reached.
+        // The shares of the signals add up to 1; below, each cause alone reaches its share of the
+        // target.
         let sum: f64 = label.signals.values().sum();
         assert!(
             label.signals.is_empty() || (sum - 1.0).abs() < 1e-9,
             "{case}"
         );
-        // Places are the same shares, taken further apart.
+        // Places divide the same shares further.
         let places: f64 = label.places.iter().map(|p| p.share).sum();
         assert!(places <= 1.0 + 1e-9 && label.places.is_empty() == label.signals.is_empty());
         for place in &label.places {
@@ -83,12 +85,13 @@ fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
         assert_eq!(label.effects.is_empty(), label.kind == "none");
     }
     notices_changes(&a)?;
-    // A whole set is never written into.
+    // A complete set is never written to.
     assert!(made(&a, 7, 1).is_err());
     goes_on_where_it_was_interrupted(&a, &b)
 }
 
-/// Brings `b` to where a run may be killed: two cases are there, a third has no label yet, and the rest was not begun.
+/// Brings `b` into a state in which a run may be killed: two cases are complete, a third has no
+/// label yet, and the rest is missing.
 fn goes_on_where_it_was_interrupted(a: &Path, b: &Path) -> Result<()> {
     let remove = |path: PathBuf| std::fs::remove_file(path).expect("a file");
     for (number, (case, label)) in labels(a).iter().enumerate() {
@@ -103,15 +106,16 @@ fn goes_on_where_it_was_interrupted(a: &Path, b: &Path) -> Result<()> {
     }
     remove(b.join("sealed/labels.json"));
     remove(b.join("studies/seal.json"));
-    // Of another seed it is another set.
+    // Another seed makes another set.
     assert!(made(b, 8, 2).is_err());
     made(b, 7, 2)?;
     assert!(files(a) == files(b), "an interrupted set differs");
     Ok(())
 }
 
-/// The studies, which are all that a diagnosis is given, name no cause, no salt and no seed, and a
-/// commitment cannot be found by trying labels.
+/// Checks that the studies name no cause, no salt and no seed.
+///
+/// A diagnosis gets the studies alone. Trying labels must not reveal the label of a commitment.
 fn reveals_nothing(folder: &Path) {
     let studies = folder.join("studies");
     let labels = labels(folder);
@@ -121,7 +125,7 @@ fn reveals_nothing(folder: &Path) {
         let text = String::from_utf8_lossy(bytes);
         for cause in causes::ALL {
             let name = cause.name().trim_start_matches("unknown:");
-            // Words such as `mass` and `geometry` are MJCF's own.
+            // MJCF itself has words such as `mass` and `geometry`.
             let own = !name.contains('-');
             assert!(
                 own || !text.contains(name),
@@ -169,7 +173,7 @@ fn study(folder: &Path) -> BTreeMap<String, String> {
         .collect()
 }
 
-/// A label or a study that is changed after the sealing is found.
+/// Checks that a change of a label or a study after the sealing is found.
 fn notices_changes(folder: &Path) -> Result<()> {
     let (studies, file) = (folder.join("studies"), folder.join("sealed/labels.json"));
     assert_eq!(verify(&studies, &file)?, Vec::<String>::new());
@@ -186,7 +190,7 @@ fn notices_changes(folder: &Path) -> Result<()> {
     assert!(verify(&studies, &other)?[0].contains("no label"));
     std::fs::write(&other, &text).expect("a file");
     assert!(verify(&studies, &other)?.is_empty());
-    // One digit of one reading.
+    // Changes one digit of one reading.
     let log = studies.join(&case).join("test_0.csv");
     let before = std::fs::read_to_string(&log).expect("a log");
     std::fs::write(&log, before.replacen('7', "8", 1)).expect("a log");

@@ -1,10 +1,10 @@
-//! Masses, their places, and forces on bodies.
+//! Masses, their positions, and forces on bodies.
 
 use super::rig::{BALL, G, PENDULUM, SLIDE, Setup, WHEEL, near};
 
-/// Draws whose direction is that of z.
+/// Draws that give the direction of z.
 const UP: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
-/// Draws whose direction is that of x.
+/// Draws that give the direction of x.
 const AHEAD: [f64; 4] = [0.5, 0.0, 0.0, 0.0];
 
 const REST: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
@@ -25,12 +25,12 @@ fn larger_moments_slow_a_wheel_down() {
 
 #[test]
 fn a_pendulum_whose_center_lies_aside_hangs_askew() {
-    // A body whose frame is that of its inertia: MuJoCo's shortcut for those must be off.
+    // The body's frame is that of its inertia; MuJoCo's shortcut for such bodies must be off.
     let mut setup = Setup::new(PENDULUM, "center-of-mass", "bob", 0.05).drawn(AHEAD);
     setup.causes.push(("viscous-friction", "pivot", 3.0));
     let run = setup.lasting(4.0).run(|_| 0.0);
     near(run.value("x"), 0.05, 1e-9);
-    // The centre hangs below the pivot: turned about +y by the angle from -z towards -x.
+    // The centre hangs below the pivot. The angle about +y is measured from -z towards -x.
     near(run.at(4.0, 0), (0.05f64 / 0.5).atan(), 3e-3);
 }
 
@@ -97,7 +97,7 @@ fn quadratic_drag_takes_a_falling_ball_along_the_logarithm_of_a_hyperbolic_cosin
 
 #[test]
 fn a_spinning_ball_curves_at_the_rate_of_its_magnus_force() {
-    // Spin about the vertical at 20 rad/s: the level velocity turns at c w / m.
+    // The body spins about the vertical at 20 rad/s. Its horizontal velocity rotates at c w / m.
     let (c, w, v) = (0.002, 20.0, 3.0);
     let run = Setup::new(BALL, "magnus", "ball", c)
         .from(&REST, &[v, 0.0, 0.0, 0.0, 0.0, w])
@@ -109,7 +109,7 @@ fn a_spinning_ball_curves_at_the_rate_of_its_magnus_force() {
 
 #[test]
 fn a_gust_gives_its_momentum_and_no_more() {
-    // The mean of a squared sine is a half: F L / 2 over the mass.
+    // The mean of a squared sine is a half: the velocity is F L / 2 over the mass.
     let run = Setup::new(SLIDE, "unknown:gust", "mass", 3.0)
         .drawn(AHEAD)
         .run(|_| 0.0);
@@ -122,13 +122,14 @@ fn a_hidden_wheel_does_no_work() {
         .drawn(UP)
         .from(&REST, &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0])
         .run(|_| 0.0);
-    // A ball of I = 0.4 m r² turns about x; the torque H x w turns w about z at H / I and keeps its length.
+    // A ball of I = 0.4 m r² rotates about x. The torque H x w rotates w about z at H / I and keeps
+    // its magnitude.
     let inertia = 0.4 * 0.1 * 0.05f64.powi(2);
     let dt = 0.002;
     let rate = |t: f64| {
         let q = |t: f64| unit([3, 4, 5, 6].map(|c| run.at(t, c)));
         let (a, b) = (q(t), q(t + dt));
-        // World angular velocity from two orientations: 2 q' q*.
+        // Angular velocity in the world from two orientations: 2 q' q*.
         let d: Vec<f64> = a.iter().zip(&b).map(|(x, y)| (y - x) / dt).collect();
         let x = 2.0 * (-d[0] * a[1] + d[1] * a[0] - d[2] * a[3] + d[3] * a[2]);
         let y = 2.0 * (-d[0] * a[2] + d[2] * a[0] - d[3] * a[1] + d[1] * a[3]);

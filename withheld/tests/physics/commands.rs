@@ -1,4 +1,4 @@
-//! What happens to commands: a mass of 2 kg under a force that begins at 0.1 s.
+//! Effects on commands: a mass of 2 kg under a force that begins at 0.1 s.
 
 use super::rig::{G, SERVO, SLIDE, Setup, near};
 
@@ -10,7 +10,7 @@ fn step(time: f64) -> f64 {
 fn a_delay_that_is_no_multiple_of_a_step_shifts_the_motion_by_itself() {
     let delay = 0.0537_21;
     let run = Setup::new(SLIDE, "actuator-delay", "motor", delay).run(step);
-    // 2 m/s² from 0.1 s + delay on.
+    // 2 m/s² from 0.1 s + delay.
     let t = 1.0 - 0.1 - delay;
     near(run.at(1.0, 1), 2.0 * t, 1e-4);
     near(run.at(1.0, 0), t * t, 1e-3);
@@ -35,7 +35,7 @@ fn a_gain_scales_and_a_bias_shifts_the_acceleration() {
 
 #[test]
 fn a_drive_gives_no_more_than_its_limit() {
-    // The peak of the rig is 10 N: three tenths are missing.
+    // The rig's peak force is 10 N; three tenths of it are missing.
     let run = Setup::new(SLIDE, "actuator-saturation", "motor", 0.3).run(|_| 9.0);
     near(run.value("limit"), 7.0, 1e-9);
     near(run.at(1.0, 1), 3.5, 1e-4);
@@ -74,17 +74,17 @@ fn a_supply_that_falls_takes_a_growing_share_of_the_force() {
 
 #[test]
 fn a_play_of_the_command_swallows_its_width_at_each_turn() {
-    // Half the width is lost on the way up, the whole on the way back.
+    // Half the width is lost on the way up, the whole width on the way back.
     let command = |t: f64| if t < 0.5 { 4.0 } else { 0.0 };
     let run = Setup::new(SLIDE, "actuator-hysteresis", "motor", 1.0).run(command);
-    // The path begins at 4 N, as before the first row; then it hangs 0.5 N above 0.
+    // The filter begins at 4 N, the command before the first row. Later it stays 0.5 N above 0.
     near(run.at(0.5, 1), 1.0, 1e-4);
     near(run.at(1.0, 1) - run.at(0.5, 1), 0.25 * 0.5, 1e-3);
 }
 
 #[test]
 fn a_slew_limit_turns_a_step_into_a_ramp() {
-    // 1 / 0.25 s of a typical command of 1: 4 N need a second from 0.1 s on.
+    // The rate is 1 N / 0.25 s for a typical command of 1 N: 4 N take one second from 0.1 s.
     let run = Setup::new(SLIDE, "unknown:slew-limit", "motor", 0.25).run(step);
     let t = 0.9;
     near(run.at(1.0, 1), 0.5 * 4.0 * t * t / 2.0, 3e-3);
@@ -92,7 +92,8 @@ fn a_slew_limit_turns_a_step_into_a_ramp() {
 
 #[test]
 fn a_force_that_falls_with_speed_ends_at_a_top_speed() {
-    // The rig's typical speed is 1 m/s: with a size of 2 the force is gone at 0.5 m/s. F = 10 N, m = 2 kg.
+    // The rig's typical speed is 1 m/s, so at a size of 2 the force vanishes at 0.5 m/s. F = 10 N,
+    // m = 2 kg.
     let run = Setup::new(SLIDE, "torque-speed-limit", "motor", 2.0).run(|_| 100.0);
     let speed = |t: f64| 0.5 * (1.0 - (-10.0 * t / (2.0 * 0.5)).exp());
     for t in [0.05, 0.1, 0.3, 1.0] {

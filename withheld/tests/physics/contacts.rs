@@ -4,7 +4,7 @@ use super::rig::{G, PUCK, Setup, near};
 
 /// Friction of the rig's board.
 const MU: f64 = 0.2;
-/// Height of a puck that rests: it sinks in by `(1 - d) g / (d k)`, 0.025 mm.
+/// Height of a puck at rest: it sinks in by `(1 - d) g / (d k)`, 0.025 mm.
 const HEIGHT: f64 = 0.029_975;
 
 fn slide(cause: &'static str, size: f64, draw: [f64; 4], velocity: [f64; 3]) -> super::rig::Run {
@@ -22,7 +22,7 @@ fn friction_brakes_a_puck_by_its_coefficient() {
     near(run.value("factor"), 1.5, 1e-9);
     let t = 0.5;
     near(run.at(t, 0), 2.0 * t - 0.5 * 1.5 * MU * G * t * t, 1e-2);
-    // It stops after v / (mu g) and v² / (2 mu g).
+    // The puck stops after v / (mu g), at v² / (2 mu g).
     near(run.at(1.0, 0), 4.0 / (2.0 * 1.5 * MU * G), 1e-2);
 }
 
@@ -37,11 +37,11 @@ fn friction_that_grows_brakes_by_its_integral() {
 
 #[test]
 fn a_patch_brakes_beyond_its_edge_only() {
-    // Along x (the second draw); the third draw sets the edge.
+    // The edge is along x, by the second draw; the third draw sets its position.
     let run = slide("friction-patch", 1.0, [0.9, 0.1, 0.8, 0.5], [2.0, 0.0, 0.0]);
     let edge = run.value("place");
     assert!(edge > 0.01 && edge < 0.9, "edge at {edge}");
-    // Energy: v² - 2 mu g edge is left at the edge, twice the friction beyond.
+    // Energy: v² - 2 mu g edge is left at the edge. The friction doubles beyond it.
     let left = 4.0 - 2.0 * MU * G * edge;
     let stop = edge + left / (2.0 * run.value("ratio") * MU * G);
     let slow = Setup::new(PUCK, "friction-patch", "board", 1.0)
@@ -64,7 +64,8 @@ fn friction_by_direction_differs_between_x_and_y() {
     near(y.at(t, 1), 1.5 * t - 0.5 * 0.6 * MU * G * t * t, 1e-2);
 }
 
-/// A drop from 0.2 m above contact; the height of the first bounce, and the deepest penetration.
+/// Drops the puck from 0.2 m above contact. Returns the height of the first bounce and the deepest
+/// penetration.
 fn drop(cause: &'static str, size: f64, draw: [f64; 4]) -> (f64, f64) {
     let run = Setup::new(PUCK, cause, "board", size)
         .drawn(draw)
@@ -83,8 +84,10 @@ fn drop(cause: &'static str, size: f64, draw: [f64; 4]) -> (f64, f64) {
     (highest, -lowest)
 }
 
-/// The contact of the rig by hand: within it `z'' = -g (1 - d) - d (k z + b z')` where it is
-/// compressed, `d` its impedance (0.9 to 0.95 over a millimetre, cubic between), as MuJoCo's documentation says.
+/// Integrates the rig's contact by hand, by MuJoCo's documentation.
+///
+/// While it is compressed, `z'' = -g (1 - d) - d (k z + b z')`. Its impedance `d` rises from 0.9 to
+/// 0.95 over a millimetre, piecewise quadratically.
 fn by_hand(k: f64, b: f64) -> (f64, f64) {
     let (mut z, mut v) = (0.2, 0.0);
     let (dt, mut lowest, mut highest) = (1e-6, 0.0f64, 0.0f64);
@@ -99,9 +102,10 @@ fn by_hand(k: f64, b: f64) -> (f64, f64) {
                 1.0 - 2.0 * (1.0 - x).powi(2)
             };
             let d = 0.9 + 0.05 * y;
-            // The direct form of solref is scaled by the largest impedance, squared for the stiffness.
+            // The direct form of solref is scaled by the largest impedance, which is squared for
+            // the stiffness.
             let reference = -b / 0.95 * v - k * d / (0.95 * 0.95) * z;
-            // A contact pushes and never pulls.
+            // A contact pushes but never pulls.
             a = a.max((1.0 - d) * -G + d * reference);
         }
         v += dt * a;

@@ -1,4 +1,4 @@
-//! Forces at joints, and what lies between a drive and its joint.
+//! Forces at joints, and transmissions between drive and joint.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,7 @@ fn a_pendulum_with_viscous_friction_swings_down_as_the_formula_says() {
     for t in [0.5, 1.3, 2.2, 3.0] {
         let (sin, cos) = (damped * t).sin_cos();
         let expected = q0 * (-decay * t).exp() * (cos + decay / damped * sin);
-        // A hundredth of what is left of the swing.
+        // A hundredth of the remaining amplitude of the swing.
         let tolerance = 0.01 * q0 * (-decay * t).exp();
         assert!((run.at(t, 0) - expected).abs() < tolerance, "at {t} s");
     }
@@ -150,7 +150,8 @@ fn compliance_keeps_the_limit_of_a_servo_that_says_it_is_limited() {
         ..SERVO
     };
     let run = Setup::new(machine, "joint-compliance", "rail", 0.002).run(|_| 0.0);
-    // 5 N of drive against 9.81 N of weight: the load falls, held back by its damping of 2 N s/m.
+    // The drive gives 5 N against a weight of 9.81 N. The load falls against its damping of 2 N
+    // s/m.
     let (pull, damping) = (G - 5.0, 2.0);
     near(
         run.at(1.0, 1),
@@ -165,7 +166,7 @@ fn backlash_hangs_a_load_half_its_width_lower() {
     let run = Setup::new(SERVO, "backlash", "rail", width)
         .lasting(3.0)
         .run(|_| 0.0);
-    // The ends of the play give way by a tenth of a millimetre under the load.
+    // The ends of the play yield by a tenth of a millimetre under the load.
     let expected = -(G / 1000.0 + width / 2.0);
     assert!(
         (run.at(3.0, 0) - expected).abs() < 2e-4,
@@ -176,7 +177,8 @@ fn backlash_hangs_a_load_half_its_width_lower() {
 
 #[test]
 fn backlash_is_lost_once_at_each_reversal() {
-    // Level, driven slowly up and down against the joint's damping: the load trails by half the width.
+    // The axis is horizontal. The drive moves slowly up and down against the joint's damping, and
+    // the load trails by half the width.
     let mut machine = SERVO;
     let text = SERVO.model.replace("axis=\"0 0 1\"", "axis=\"1 0 0\"");
     machine.model = Box::leak(text.into_boxed_str());
@@ -185,7 +187,7 @@ fn backlash_is_lost_once_at_each_reversal() {
         let run = Setup::new(machine, cause, "rail", size)
             .lasting(2.0)
             .run(up_and_down);
-        // The same command on the way up and on the way down.
+        // Difference between the way up and the way back at the same command.
         run.at(0.5, 0) - run.at(1.5, 0)
     };
     let width = 0.02;
@@ -204,7 +206,7 @@ fn a_hidden_absorber_keeps_the_momentum_of_both() {
         .from(&[0.0], &[0.0])
         .lasting(6.0)
         .run(|t| if t < 0.1 { 10.0 } else { 0.0 });
-    // Once its swing has died out both move at the impulse over the sum of the masses.
+    // Once the oscillation has decayed, both move at the impulse divided by the sum of the masses.
     let mean = (run.at(6.0, 0) - run.at(3.0, 0)) / 3.0;
     near(mean, 1.0 / (2.0 + inertia), 2e-2);
 }

@@ -1,6 +1,8 @@
-//! The stick itself: what each cause does, against closed forms and energy, momentum and forces by hand.
+//! Checks what each cause does against closed forms, conservation of energy and momentum, and
+//! forces by hand.
 //!
-//! Tolerances are those of a time step of 0.5 ms of the first order: a few parts in a thousand.
+//! The tolerances are those of a first-order integrator at a time step of 0.5 ms: a few parts in a
+//! thousand.
 
 mod bodies;
 mod commands;

@@ -1,4 +1,4 @@
-//! What happens to readings: a mass that moves at 2 m/s.
+//! Effects on readings: a mass that moves at 2 m/s.
 
 use super::rig::{SLIDE, Setup, near};
 
@@ -15,7 +15,7 @@ fn an_old_reading_is_where_the_mass_was() {
     for t in [0.0, 0.02, 0.5, 1.0] {
         near(run.at(t, 0), 0.3 + 2.0 * (t - delay), 1e-6);
     }
-    // The other sensor is in step.
+    // The other sensor has no delay.
     near(run.at(1.0, 1), 2.0, 1e-9);
 }
 

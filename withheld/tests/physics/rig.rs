@@ -1,4 +1,4 @@
-//! Small machines whose motion is known, and a run of one with a cause.
+//! Small machines with known motion, and a run of one with a cause.
 
 use asid_withheld::anatomy::Anatomy;
 use asid_withheld::cause::Place;
@@ -44,7 +44,7 @@ pub const SLIDE: Machine = Machine {
     ..PLAIN
 };
 
-/// A ring of 1 kg at 0.2 m about a vertical axis: 0.04 kg m² of points, with a motor.
+/// A ring of 1 kg at 0.2 m about a vertical axis: 0.04 kg m² of point masses, with a motor.
 pub const WHEEL: Machine = Machine {
     model: r#"<mujoco>
   <option timestep="0.001" integrator="implicitfast"/>
@@ -60,7 +60,8 @@ pub const WHEEL: Machine = Machine {
     ..PLAIN
 };
 
-/// A pendulum: 1 kg hung by 0.5 m, its own moments small and those of its frame, with a motor.
+/// A pendulum with a motor: 1 kg hung by 0.5 m. Its own moments of inertia are small, in the axes
+/// of its frame.
 pub const PENDULUM: Machine = Machine {
     model: r#"<mujoco>
   <option timestep="0.001" integrator="implicitfast"/>
@@ -76,7 +77,7 @@ pub const PENDULUM: Machine = Machine {
     ..PLAIN
 };
 
-/// A load of 1 kg on a vertical slide that a position servo holds.
+/// A load of 1 kg on a vertical slide, held by a position servo.
 pub const SERVO: Machine = Machine {
     model: r#"<mujoco>
   <option timestep="0.001" integrator="implicitfast"/>
@@ -135,58 +136,58 @@ pub const PUCK: Machine = Machine {
     ..PLAIN
 };
 
-/// A run with a cause.
+/// The result of a run with a cause.
 pub struct Run {
     record: Record,
     /// True values of the cause's parameters.
     pub values: Vec<(&'static str, f64)>,
-    /// Steps of the readings.
+    /// Quantisation steps of the readings.
     pub steps: Vec<(usize, f64)>,
 }
 
 impl Run {
-    /// A number of the readings at a time.
+    /// A reading at a time.
     pub fn at(&self, time: f64, column: usize) -> f64 {
         self.in_episode(0, time, column)
     }
 
-    /// The same in an episode.
+    /// A reading at a time of an episode.
     pub fn in_episode(&self, episode: usize, time: f64, column: usize) -> f64 {
         self.record.at(episode, time, column)
     }
 
-    /// A parameter's value.
+    /// The value of a parameter.
     pub fn value(&self, name: &str) -> f64 {
         let found = self.values.iter().find(|(n, _)| *n == name);
         found.map_or(f64::NAN, |(_, v)| *v)
     }
 }
 
-/// What a run needs.
+/// Describes a run.
 pub struct Setup {
     /// The machine.
     pub machine: Machine,
-    /// Cause, site and size; several act in their order.
+    /// Cause, site and size; several causes act in this order.
     pub causes: Vec<(&'static str, &'static str, f64)>,
-    /// What is drawn beside the size.
+    /// Random numbers for everything but the size.
     pub draw: [f64; 4],
-    /// Position and velocity at the start.
+    /// Initial position and velocity.
     pub start: (Vec<f64>, Vec<f64>),
     /// Length, s.
     pub seconds: f64,
-    /// How many episodes there are, all alike.
+    /// Number of episodes, all alike.
     pub episodes: usize,
 }
 
 impl Setup {
-    /// A cause at a machine, for a second, from rest at the origin.
+    /// One cause at a machine, for one second, from rest at the origin.
     pub fn new(machine: Machine, cause: &'static str, site: &'static str, size: f64) -> Self {
         let anatomy = Anatomy::of(&machine).expect("a model");
         Self {
             start: (anatomy.qpos0.clone(), vec![0.0; anatomy.nv]),
             machine,
             causes: vec![(cause, site, size)],
-            // Signs are positive; no offset of dry friction.
+            // These draws give positive signs and no offset of dry friction.
             draw: [0.9, 0.1, 0.9, 0.1],
             seconds: 1.0,
             episodes: 1,
@@ -213,7 +214,7 @@ impl Setup {
         self
     }
 
-    /// Runs it under a command that holds for rows of 10 ms.
+    /// Runs it with commands that are held for rows of 10 ms.
     pub fn run(self, command: impl Fn(f64) -> f64) -> Run {
         let anatomy = Anatomy::of(&self.machine).expect("a model");
         let rows = (self.seconds * 100.0).round() as usize + 1;
@@ -226,7 +227,7 @@ impl Setup {
             period: 0.01,
         };
         let middle: Vec<f64> = self.machine.parameters.iter().map(|_| 2.0).collect();
-        // Scales only choose what is drawn relative to them: all are 1.
+        // The typical values only scale random draws, so all are 1.
         let typical = Typical {
             speed: vec![1.0; anatomy.nv],
             drive: vec![1.0; anatomy.nv],
@@ -259,7 +260,7 @@ impl Setup {
     }
 }
 
-/// Asserts that two numbers agree within a share of the second, or within a small length.
+/// Asserts that two numbers agree within a share of the second, or within 1e-5.
 #[track_caller]
 pub fn near(found: f64, expected: f64, share: f64) {
     let tolerance = (share * expected.abs()).max(1e-5);
