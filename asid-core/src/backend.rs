@@ -1,4 +1,4 @@
-//! An engine: compiles a scene, says what it can do, makes batches.
+//! An engine: compiles a scene, states its capabilities, makes batches.
 
 use std::sync::Arc;
 
@@ -9,8 +9,8 @@ use crate::simulator::{BatchConfig, Simulator};
 use crate::target::Target;
 
 bitflags::bitflags! {
-    /// What an engine can do. Tests and algorithms branch on these bits and
-    /// never on an engine's name.
+    /// Capabilities of an engine. Tests and algorithms branch on these bits and never on an
+    /// engine's name.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub struct Capabilities: u64 {
         /// Hinge, slide and ball joints in a tree.
@@ -66,35 +66,35 @@ pub trait Backend: Send + Sync {
     /// Version of the engine.
     fn version(&self) -> String;
 
-    /// What it can do.
+    /// Its capabilities.
     fn capabilities(&self) -> Capabilities;
 
     /// Compiles a scene.
     ///
     /// # Errors
-    /// [`crate::Error::Scene`] where the engine refuses it or would ignore a
-    /// part that changes the physics.
+    /// [`crate::Error::Scene`] when the engine refuses it or would ignore a part that changes the
+    /// physics.
     fn load(&self, scene: &Scene) -> Result<Arc<dyn Model>>;
 }
 
-/// A scene compiled by an engine; batches are made of it.
+/// A scene compiled by an engine, from which batches are made.
 pub trait Model: Send + Sync {
-    /// Names and places.
+    /// Names and indices.
     fn layout(&self) -> &Layout;
 
-    /// Name and version of the engine, for files that outlive the run; empty where it does not say.
+    /// Name and version of the engine, for files that outlive the run; empty if unknown.
     fn engine(&self) -> String {
         String::new()
     }
 
-    /// Value of a target in the scene as it is.
+    /// Value of a target in the unchanged scene.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] where the scene has no such target or the
-    /// engine cannot change it.
+    /// [`crate::Error::Parameter`] when the scene has no such target or the engine cannot change
+    /// it.
     fn nominal(&self, target: &Target) -> Result<f64>;
 
-    /// Makes a batch, every simulation reset and with nominal parameters.
+    /// Makes a batch with every simulation reset and with nominal parameters.
     ///
     /// # Errors
     /// As [`Model::nominal`], for every target of the configuration.

@@ -1,8 +1,8 @@
-//! How hard a task is: numbers that a task lets be set.
+//! How hard a task is: numbers of a task that can be set.
 //!
-//! A task that every method solves, or none, tells no methods apart. Each task therefore names the
-//! numbers that make it easier or harder: the size of its goal, the noise and the rate of its trackers,
-//! the speed of the hand. A value applies to all that takes part: the real world, the method's
+//! A task that every method solves, or none, does not distinguish methods. Each task therefore
+//! names the numbers that make it easier or harder: the size of its goal, the noise and the rate of
+//! its trackers, the speed of the hand. A value applies everywhere: to the real world, the method's
 //! simulator, and the rule of success.
 
 use std::collections::BTreeMap;
@@ -12,18 +12,18 @@ use crate::error::{Error, Result};
 /// Names of the presets: the task's own values, and those of the paper or its published code.
 pub const PRESETS: [&str; 2] = ["default", "published"];
 
-/// One number that says how hard a task is.
+/// One number that determines how hard a task is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difficulty {
     /// Name in `difficulty.NAME`.
     pub name: String,
     /// SI unit; may be empty.
     pub unit: String,
-    /// What it is, one line.
+    /// One-line description.
     pub about: String,
     /// The task's own value.
     pub default: f64,
-    /// Value in the paper or its published code, where there is one.
+    /// Value in the paper or its published code, if any.
     pub published: Option<f64>,
     /// Smallest and largest value that the task can be set to.
     pub range: [f64; 2],
@@ -52,7 +52,7 @@ impl Difficulty {
         }
     }
 
-    /// Checks that a value is one that the task can be set to.
+    /// Checks that the task can be set to a value.
     ///
     /// # Errors
     /// [`Error::Config`] naming `difficulty.NAME` and the range.
@@ -88,7 +88,7 @@ impl Levels {
         Self { all, values }
     }
 
-    /// The values of a preset. Of a difficulty without a published value the default is taken.
+    /// The values of a preset. A difficulty without a published value takes its default.
     ///
     /// # Errors
     /// When there is no such preset; the message lists them.
@@ -106,7 +106,7 @@ impl Levels {
         Ok(levels)
     }
 
-    /// The same with some values set.
+    /// The same with some values changed.
     ///
     /// # Errors
     /// When a name is unknown (the message lists the known ones) or a value is out of range.
@@ -132,7 +132,7 @@ impl Levels {
         })
     }
 
-    /// The numbers that the values are of.
+    /// The difficulties to which the values belong.
     #[must_use]
     pub fn all(&self) -> &[Difficulty] {
         &self.all

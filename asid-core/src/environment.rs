@@ -1,24 +1,24 @@
 //! A batch of episodic environments, as a learner sees them.
 //!
-//! Learners never see a simulator: they see observations, actions, rewards and
-//! the two ways in which an episode ends, for a whole batch at a time. All
-//! arrays are row-major with one row an environment.
+//! Learners never see a simulator. They see observations, actions, rewards and the two ways in
+//! which an episode ends, for a whole batch at a time. All arrays are row-major with one row an
+//! environment.
 
 use crate::error::Result;
 
-/// What one [`BatchEnvironment::step`] returns, for `n` environments.
+/// Result of one [`BatchEnvironment::step`], for `n` environments.
 ///
-/// The buffers are owned by the caller and reused from step to step.
+/// The caller owns the buffers and reuses them from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Transition {
-    /// Observation to act on next, `n x observation_len`. Where an episode
-    /// ended it is the first observation of the next one.
+    /// Observation to act on next, `n x observation_len`. After the end of an episode it is the
+    /// first observation of the next one.
     pub observation: Vec<f64>,
     /// Reward of the step, `n`.
     pub reward: Vec<f64>,
-    /// The episode reached a terminal state: its value is zero, `n`.
+    /// Whether the episode reached a terminal state, whose value is zero, `n`.
     pub terminated: Vec<bool>,
-    /// The episode was cut by its time limit: bootstrap from `final_observation`, `n`.
+    /// Whether the time limit cut the episode, `n`: bootstrap from `final_observation`.
     pub truncated: Vec<bool>,
     /// Observation at the end of the step and before any reset, `n x observation_len`.
     pub final_observation: Vec<f64>,
@@ -38,7 +38,7 @@ impl Transition {
     }
 }
 
-/// A batch of environments that step together and reset on their own.
+/// A batch of environments that step together and reset automatically.
 pub trait BatchEnvironment {
     /// Number of environments, `n`.
     fn batch_size(&self) -> usize;
@@ -46,15 +46,16 @@ pub trait BatchEnvironment {
     fn observation_len(&self) -> usize;
     /// Entries of one action; each lies in `[-1, 1]` and is clipped to it.
     fn action_len(&self) -> usize;
-    /// Starts a new episode everywhere and writes the first observations, `n x observation_len`.
+    /// Starts a new episode in each environment and writes the first observations, `n x
+    /// observation_len`.
     ///
     /// # Errors
-    /// When the simulator under it fails.
+    /// When the underlying simulator fails.
     fn reset(&mut self, observation: &mut [f64]) -> Result<()>;
-    /// Applies `actions` (`n x action_len`) and writes what came of them.
+    /// Applies `actions` (`n x action_len`) and writes the results.
     ///
     /// # Errors
-    /// When the simulator under it fails as a whole; a single diverged episode
-    /// is terminated instead.
+    /// When the underlying simulator fails as a whole; a single diverged episode is terminated
+    /// instead.
     fn step(&mut self, actions: &[f64], transition: &mut Transition) -> Result<()>;
 }

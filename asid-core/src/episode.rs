@@ -1,9 +1,8 @@
 //! Logs of episodes: one CSV file each.
 //!
-//! A row holds the time (s), the command of each actuator from that time on
-//! (`ctrl.<actuator>`), and each sensor's reading of the state at that time,
-//! before the row's command acts (`<sensor>`, or `<sensor>.0`, `<sensor>.1`…).
-//! An empty cell is a missing reading and is NaN here.
+//! A row holds the time (s), the command of each actuator from that time on (`ctrl.<actuator>`),
+//! and each sensor's reading of the state at that time, before the row's command acts (`<sensor>`,
+//! or `<sensor>.0`, `<sensor>.1`…). An empty cell is a missing reading and is NaN here.
 
 use std::path::Path;
 
@@ -32,11 +31,11 @@ pub struct Episode {
     pub channels: Vec<ChannelColumns>,
     /// Readings, `rows x width`; NaN where missing.
     pub readings: Vec<f64>,
-    /// State at the first row, where the log has it.
+    /// State at the first row, if the log has it.
     pub initial: Option<InitialState>,
 }
 
-/// State at the first row of a log; NaN where the log does not say.
+/// State at the first row of a log; NaN for unknown entries.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitialState {
     /// Positions, `nq`.
@@ -46,7 +45,7 @@ pub struct InitialState {
 }
 
 impl InitialState {
-    /// True where nothing is left open.
+    /// Whether all entries are known.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.qpos.iter().chain(&self.qvel).all(|x| x.is_finite())
@@ -54,7 +53,8 @@ impl InitialState {
 }
 
 impl Episode {
-    /// Commands alone, `frames x nu`, as a log: a row every `period` seconds from 0, the last command held.
+    /// A log of commands only, `frames x nu`: a row every `period` seconds from 0, the last command
+    /// held.
     #[must_use]
     pub fn of_commands(layout: &Layout, ctrl: Vec<f64>, period: f64) -> Self {
         let mut episode = Self {
@@ -66,8 +66,10 @@ impl Episode {
         episode
     }
 
-    /// Gives a log of commands the times (s) of its start and of the ends of its frames, without the dust of products,
-    /// and its last row the last command.
+    /// Completes a log of commands.
+    ///
+    /// It gets the times (s) of its start and of the ends of its frames, without rounding noise of
+    /// products. Its last row gets the last command.
     pub fn close(&mut self, period: f64) {
         let nu = self.actuators.len();
         self.ctrl.extend_from_within(self.ctrl.len() - nu..);
@@ -81,20 +83,21 @@ impl Episode {
         self.time.len()
     }
 
-    /// Entries of a reading's row.
+    /// Number of entries in a row of readings.
     #[must_use]
     pub fn width(&self) -> usize {
         self.channels.iter().map(|c| c.len).sum()
     }
 
-    /// Reading's row `i`.
+    /// Row `i` of the readings.
     #[must_use]
     pub fn reading(&self, i: usize) -> &[f64] {
         let w = self.width();
         &self.readings[i * w..(i + 1) * w]
     }
 
-    /// Some consecutive rows as a log of their own, whose start is not known unless it is this log's.
+    /// Some consecutive rows as a log of their own. Its initial state is unknown unless it starts
+    /// at this log's first row.
     #[must_use]
     pub fn part(&self, rows: std::ops::Range<usize>) -> Self {
         let (nu, width) = (self.actuators.len(), self.width());
@@ -109,7 +112,7 @@ impl Episode {
         }
     }
 
-    /// Where a channel lies in a reading's row.
+    /// Range of a channel in a row of readings.
     #[must_use]
     pub fn channel(&self, name: &str) -> Option<std::ops::Range<usize>> {
         let mut start = 0;
@@ -122,8 +125,8 @@ impl Episode {
         None
     }
 
-    /// Readings of the channels `names` only, `rows x their width`, NaN where a
-    /// channel is not in the log.
+    /// Readings of the channels `names` only, `rows x their width`; NaN for a channel that is not
+    /// in the log.
     #[must_use]
     pub fn select(&self, layout: &Layout, names: &[String]) -> Vec<f64> {
         let picks: Vec<(Option<std::ops::Range<usize>>, usize)> = names
@@ -184,7 +187,7 @@ impl Episode {
     }
 }
 
-/// A cell of text, in quotes where a CSV file needs them (RFC 4180).
+/// A text cell, quoted where CSV requires it (RFC 4180).
 fn quoted(text: &str) -> String {
     if text.contains(['"', ',', '\n', '\r']) || text.trim() != text {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -193,7 +196,7 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// The shortest text that reads back as the same number.
+/// The shortest text that parses to the same number.
 fn cell(x: f64) -> String {
     if x != 0.0 && (x.abs() < 1e-4 || x.abs() >= 1e15) {
         format!("{x:e}")

@@ -5,22 +5,22 @@ use std::path::PathBuf;
 /// Result of this crate's functions.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What can go wrong, in words a user can act on.
+/// What can go wrong, worded so that a user can act on it.
 ///
-/// The message is one line. [`Error::is_usage`] tells a call that was wrong
-/// (exit status 2) from work that failed (exit status 1).
+/// The message is one line. [`Error::is_usage`] distinguishes a wrong call (exit status 2) from
+/// failed work (exit status 1).
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A name that no registered item has.
     #[error("unknown {kind} `{name}`{}", suggestion(.kind, .near, *.all))]
     UnknownName {
-        /// What kind of thing was looked for, such as `task`.
+        /// The kind of thing that was looked up, such as `task`.
         kind: &'static str,
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// Names that come close, nearest first; all names where none does.
+        /// Similar names, nearest first; all names where none is similar.
         near: Vec<String>,
-        /// Whether these are all names that there are.
+        /// Whether `near` holds all existing names.
         all: bool,
     },
     /// A scene that cannot be read or that an engine refuses.
@@ -39,7 +39,7 @@ pub enum Error {
         /// What is wrong.
         message: String,
     },
-    /// A configuration value out of its domain.
+    /// A configuration value outside its domain.
     #[error("config {key}: {message}")]
     Config {
         /// The key, dotted.
@@ -71,7 +71,7 @@ pub enum Error {
         /// Why, and how to get it.
         message: String,
     },
-    /// An engine cannot do what was asked.
+    /// A request that the engine cannot fulfil.
     #[error("backend `{backend}` cannot {what}")]
     Incapable {
         /// The engine.
@@ -90,7 +90,7 @@ pub enum Error {
     /// Work that had begun failed.
     #[error("{0}")]
     Failed(String),
-    /// A caller of the library handed arrays or indices that do not fit.
+    /// Arrays or indices from a caller of the library that do not fit.
     #[error("{0}")]
     Shape(String),
     /// The user interrupted the work.
@@ -99,13 +99,13 @@ pub enum Error {
 }
 
 impl Error {
-    /// True where the call was wrong rather than the work.
+    /// Whether the call was wrong rather than the work.
     #[must_use]
     pub fn is_usage(&self) -> bool {
         !matches!(self, Self::Failed(_) | Self::Shape(_) | Self::Interrupted)
     }
 
-    /// An error of kind [`Error::UnknownName`] with the names that come close.
+    /// An error of kind [`Error::UnknownName`], with similar names.
     #[must_use]
     pub fn unknown<'a>(
         kind: &'static str,
@@ -122,7 +122,8 @@ impl Error {
         }
     }
 
-    /// The name among `known` that is at most a third of its letters away, and nearest; letters in another order are one edit.
+    /// The nearest name among `known` within an edit distance of a third of its letters; a
+    /// reordering of letters counts as one edit.
     #[must_use]
     pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
         let name = name.to_lowercase();
@@ -142,7 +143,7 @@ impl Error {
     }
 }
 
-/// Kinds of which `asid list` has every name.
+/// Kinds whose names `asid list` shows completely.
 const LISTED: [&str; 6] = [
     "task",
     "explorer",
@@ -152,7 +153,7 @@ const LISTED: [&str; 6] = [
     "effect",
 ];
 
-/// What was meant, by the names that come close, or what there is.
+/// Text that suggests the similar names, or lists what there is.
 fn suggestion(kind: &str, near: &[String], all: bool) -> String {
     let quoted: Vec<String> = near.iter().map(|n| format!("`{n}`")).collect();
     match &*quoted {
@@ -170,8 +171,8 @@ fn suggestion(kind: &str, near: &[String], all: bool) -> String {
     }
 }
 
-/// Names within a third of their length in edits of `name` or containing it,
-/// nearest first; all of `known` where none is near.
+/// Names that contain `name` or whose edit distance is within a third of their length, nearest
+/// first; all of `known` where none is near.
 fn near_names(name: &str, known: &[&str]) -> Vec<String> {
     let mut near: Vec<(usize, &str)> = known
         .iter()
@@ -205,10 +206,10 @@ fn edit_distance(a: &str, b: &str) -> usize {
     row[b.len()]
 }
 
-/// How every text begins that blames a plugin.
+/// Prefix of every text that blames a plugin.
 pub const BLAMES_PLUGIN: &str = "plugin ";
 
-/// True for the text of an error or panic that is a plugin's fault and names its file.
+/// Whether the text of an error or panic blames a plugin and names its file.
 #[must_use]
 pub fn blames_a_plugin(text: &str) -> bool {
     text.starts_with(BLAMES_PLUGIN)

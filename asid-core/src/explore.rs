@@ -7,17 +7,18 @@ use crate::problem::Problem;
 
 /// An exploration policy, played once in the real world.
 pub trait Policy: Send {
-    /// A new episode begins.
+    /// Begins a new episode.
     fn reset(&mut self);
 
-    /// The action of control step `step`, in the task's units, for a reading's row
-    /// (tracked signals with their noise, then proprioception).
+    /// Writes the action of control step `step`, in the task's units, for a row of readings.
+    ///
+    /// The row holds tracked signals with their noise, then proprioception.
     ///
     /// # Errors
     /// When planning fails.
     fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()>;
 
-    /// Return over the search, for a policy that searched when its episode began.
+    /// Return over the search, for a policy that searches at the start of its episode.
     fn take_curve(&mut self) -> Vec<CurvePoint> {
         Vec::new()
     }
@@ -38,7 +39,7 @@ pub struct CurvePoint {
 }
 
 impl CurvePoint {
-    /// Of the returns of an iteration, counted from 1.
+    /// The point of an iteration, counted from 1, from its returns.
     #[must_use]
     pub fn of(iteration: usize, returns: &[f64]) -> Self {
         let n = returns.len() as f64;
@@ -52,11 +53,11 @@ impl CurvePoint {
     }
 }
 
-/// A policy and how it came about.
+/// A policy and its search.
 pub struct Explored<'a> {
     /// The policy.
     pub policy: Box<dyn Policy + 'a>,
-    /// Return over the search; a planner that plans when the episode begins adds to it then.
+    /// Return over the search; a planner that plans at the start of the episode adds to it then.
     pub curve: Vec<CurvePoint>,
     /// What `x` counts.
     pub curve_label: &'static str,
@@ -66,8 +67,9 @@ pub struct Explored<'a> {
 
 /// Turns a task and a prior into an exploration policy.
 pub trait Explorer: Send + Sync {
-    /// Makes a policy; the prior is that of the problem's parameters. `start` is the
-    /// start pose the policy will meet, where it is known beforehand.
+    /// Makes a policy; the prior is that of the problem's parameters.
+    ///
+    /// `start` is the start pose that the policy will meet, if known beforehand.
     ///
     /// # Errors
     /// When the engine fails or the user interrupts.
@@ -77,8 +79,10 @@ pub trait Explorer: Send + Sync {
         start: Option<&[f64]>,
     ) -> Result<Explored<'a>>;
 
-    /// Trains what the explorer plays and saves it in `file`, from where the setting
-    /// `explorer.policy` loads it; false where the explorer learns nothing beforehand.
+    /// Trains what the explorer plays and saves it in `file`, from which the setting
+    /// `explorer.policy` loads it.
+    ///
+    /// Returns false if the explorer learns nothing beforehand.
     ///
     /// # Errors
     /// When the engine fails, the learner diverges, or the file cannot be written.

@@ -18,30 +18,30 @@ pub struct IterationSummary {
     pub best_loss: f64,
 }
 
-/// What identification found.
+/// Result of identification.
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// The posterior.
     pub posterior: Posterior,
     /// Start pose of each episode at the best fit, in the task's coordinates.
     pub starts: Vec<Vec<f64>>,
-    /// How the search narrowed down.
+    /// Convergence of the search.
     pub iterations: Vec<IterationSummary>,
-    /// Root mean square of the whitened residual at the best fit: 1 where the
-    /// simulator explains the readings as well as their noise allows.
+    /// Root mean square of the whitened residual at the best fit: 1 where the simulator explains
+    /// the readings as well as their noise allows.
     pub residual: f64,
-    /// How much nearby simulations differ by the luck of contact, root mean square in
-    /// units of the readings' noise; 0 where it was not measured.
+    /// Root-mean-square scatter of nearby simulations due to contact, in units of the readings'
+    /// noise; 0 where it was not measured.
     pub roughness: f64,
 }
 
-/// What an identifier assumes of the readings.
+/// An identifier's assumptions on the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Assumptions {
-    /// Whether readings are weighed by how the luck of contact runs along an episode, or by its size
-    /// alone.
+    /// Whether readings are weighted by the correlation of contact scatter along an episode, or by
+    /// its size alone.
     pub correlated: bool,
-    /// Systematic errors of the trackers, which are integrated out.
+    /// Systematic errors of the trackers, which are marginalised.
     pub tracker: TrackerPrior,
 }
 
@@ -62,14 +62,16 @@ pub trait Identifier: Send + Sync {
     /// When the engine fails, every simulation diverges, or the user interrupts.
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified>;
 
-    /// What it assumes of the readings: what an episode is expected to tell is computed alike.
+    /// Its assumptions on the readings; the expected information of an episode is computed with the
+    /// same.
     fn assumes(&self) -> Assumptions {
         Assumptions::default()
     }
 
-    /// Learns to identify from episodes of `explorer` at truths drawn from the prior, and saves
-    /// what was learned in `file`, from where the setting `identifier.network` loads it; false
-    /// where the identifier learns nothing beforehand.
+    /// Learns to identify from episodes of `explorer` with truths drawn from the prior, and saves
+    /// the result in `file`, from which the setting `identifier.network` loads it.
+    ///
+    /// Returns false if the identifier learns nothing beforehand.
     ///
     /// # Errors
     /// When the engine fails, the learner diverges, or the file cannot be written.

@@ -1,10 +1,9 @@
-//! Names and places: how the rows of a simulator's arrays are laid out.
+//! Names and indices: the layout of a simulator's arrays.
 //!
-//! Arrays follow MuJoCo's conventions whatever the engine: joints in the order
-//! of the document (bodies depth first), a free joint takes seven entries of
-//! `qpos` (position, then quaternion w x y z) and six of `qvel` (linear
-//! velocity in the world frame, angular velocity in the body frame), a ball
-//! joint four and three, a hinge (rad) or slide (m) one and one.
+//! Arrays follow MuJoCo's conventions, whatever the engine. Joints are in the order of the document
+//! (bodies depth first). A free joint takes seven entries of `qpos` (position, then quaternion w x
+//! y z) and six of `qvel` (linear velocity in the world frame, angular velocity in the body frame).
+//! A ball joint takes four and three, a hinge (rad) or slide (m) one and one.
 
 mod recording;
 
@@ -13,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 pub use recording::{Channel, Recording};
 
-/// What kind of motion a joint allows.
+/// The kind of motion that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum JointKind {
@@ -28,7 +27,7 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    /// Entries in `qpos`.
+    /// Number of entries in `qpos`.
     #[must_use]
     pub fn qpos_len(self) -> usize {
         match self {
@@ -38,7 +37,7 @@ impl JointKind {
         }
     }
 
-    /// Entries in `qvel`.
+    /// Number of entries in `qvel`.
     #[must_use]
     pub fn qvel_len(self) -> usize {
         match self {
@@ -49,7 +48,7 @@ impl JointKind {
     }
 }
 
-/// A joint and its place in `qpos` and `qvel`.
+/// A joint and its indices in `qpos` and `qvel`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
     /// Name in the document; `joint<i>` where it has none.
@@ -64,16 +63,16 @@ pub struct Joint {
     pub qvel: usize,
 }
 
-/// An actuator; its index is its place in a control row.
+/// An actuator; its index is its position in a control row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Actuator {
     /// Name in the document; `actuator<i>` where it has none.
     pub name: String,
-    /// Limits of the command, where it has any.
+    /// Limits of the command, if any.
     pub ctrl_range: Option<[f64; 2]>,
 }
 
-/// A sensor and its place in a row of all sensors.
+/// A sensor and its position in a row of all sensors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
     /// Name in the document; `sensor<i>` where it has none.
@@ -82,7 +81,7 @@ pub struct Sensor {
     pub kind: String,
     /// First entry in a row of all sensors.
     pub address: usize,
-    /// Entries: 1 for a scalar, 3 for a vector, 4 for a quaternion.
+    /// Number of entries: 1 for a scalar, 3 for a vector, 4 for a quaternion.
     pub len: usize,
 }
 
@@ -94,7 +93,7 @@ impl Sensor {
     }
 }
 
-/// Unit of the readings of a sensor of this kind, in SI; empty where it has none.
+/// Unit of the readings of a sensor of this kind, in SI; empty if there is none.
 #[must_use]
 pub fn sensor_unit(kind: &str) -> &'static str {
     match kind {
@@ -135,7 +134,7 @@ pub struct Keyframe {
     pub ctrl: Vec<f64>,
 }
 
-/// Names and places of one scene. Every engine gives the same layout for the same scene.
+/// Names and indices of one scene. Every engine gives the same layout for the same scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layout {
     /// Physics time step, s.

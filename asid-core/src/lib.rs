@@ -1,13 +1,13 @@
 //! Traits and data types of ASID. This crate knows no engine and no network.
 //!
-//! - What is simulated: a [`Scene`] (one MJCF document), compiled by a [`Backend`]
-//!   into a [`Model`], of which batches are made: [`Simulator`]. Everything is a
-//!   whole-batch call on row-major arrays, which is fast, independent of the number of
-//!   threads, and expressible as a C table.
-//! - What is done: a [`Task`] with [`Parameter`]s; an [`Explorer`] makes a [`Policy`],
-//!   a [`RealWorld`] plays it, an [`Identifier`] fits a [`Posterior`] to the
-//!   [`Episode`], a [`TaskSolver`] makes a [`TaskPolicy`].
-//! - What a tracker reads: [`signal`].
+//! - What is simulated: a [`Scene`] (one MJCF document), compiled by a [`Backend`] into a
+//!   [`Model`], from which batches are made: [`Simulator`]. Everything is a whole-batch call on
+//!   row-major arrays, which is fast, independent of the number of threads, and expressible as a C
+//!   table.
+//! - What is done: a [`Task`] with [`Parameter`]s; an [`Explorer`] makes a [`Policy`], a
+//!   [`RealWorld`] plays it, an [`Identifier`] fits a [`Posterior`] to the [`Episode`], a
+//!   [`TaskSolver`] makes a [`TaskPolicy`].
+//! - What a tracker measures: [`signal`].
 //! - How parts are found: [`registry`].
 
 pub mod backend;
@@ -34,7 +34,7 @@ pub mod target;
 pub mod task;
 pub mod tracker;
 
-// What public items speak of, so that an author need not match versions.
+// Crates whose types occur in public items, so that an author need not match versions.
 pub use mjcf_rs;
 pub use nalgebra;
 

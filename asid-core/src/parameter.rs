@@ -11,17 +11,19 @@ use crate::error::{Error, Result};
 use crate::rng::Rng;
 use crate::target::Target;
 
-/// Scale on which a parameter is uniform a priori and on which steps are taken.
+/// Scale on which a parameter's prior is uniform and on which steps are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
-    /// As it is.
+    /// The value itself.
     #[default]
     Linear,
-    /// Its logarithm.
+    /// The logarithm of the value.
     Log,
-    /// Two models, 0 and 1, each as likely as the other: what the targets are set to in
-    /// the first and in the second. The range is `[0, 1]`; a value of 0.5 or more is the second.
+    /// Two equally likely models, 0 and 1, with the targets' settings in the first and in the
+    /// second.
+    ///
+    /// The range is `[0, 1]`; a value of 0.5 or more is the second.
     Binary([f64; 2]),
 }
 
@@ -112,13 +114,13 @@ impl Parameter {
         (self.to_unit(value) - 0.5) / self.unit_std()
     }
 
-    /// Whether it has two values only.
+    /// Whether it has only two values.
     #[must_use]
     pub fn is_binary(&self) -> bool {
         matches!(self.scale, Scale::Binary(_))
     }
 
-    /// What its targets are set to at a value: the value itself, but for a binary one.
+    /// The setting of its targets at a value: the value itself, unless the parameter is binary.
     #[must_use]
     pub fn setting(&self, value: f64) -> f64 {
         match self.scale {
@@ -156,7 +158,7 @@ impl Parameter {
         self.from_unit(0.5)
     }
 
-    /// Deviation in the parameter's unit that a prior-scaled deviation stands for near `value`.
+    /// Converts a prior-scaled deviation near `value` to the parameter's unit.
     #[must_use]
     pub fn unscale_std(&self, value: f64, scaled: f64) -> f64 {
         let [low, high] = self.range;
@@ -223,7 +225,7 @@ mod tests {
         let p = parameter([0.0, 1.0], Scale::Binary([7.0, 0.2]));
         assert!(p.check().is_ok());
         assert_eq!([p.setting(0.0), p.setting(1.0)], [7.0, 0.2]);
-        // Mean 1/2 and deviation 1/2: the two models lie one prior deviation either side.
+        // Mean 1/2 and deviation 1/2: the two models lie one prior deviation to either side.
         assert_eq!([p.to_scaled(0.0), p.to_scaled(1.0)], [-1.0, 1.0]);
         assert_eq!([p.from_scaled(-0.2), p.from_scaled(0.2)], [0.0, 1.0]);
         let mut rng = Streams::new(2).stream("t");

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::parameter::Parameter;
 use crate::rng::Rng;
 
-/// What is believed of one parameter.
+/// Marginal posterior of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Marginal {
     /// Name of the parameter.
@@ -19,22 +19,22 @@ pub struct Marginal {
     pub std: f64,
     /// Central 95 % interval.
     pub interval95: [f64; 2],
-    /// The end of the prior's range at which the posterior piles up, where it does: the true
-    /// value may lie beyond, and no interval inside the range holds it then.
+    /// The end of the prior's range at which the posterior piles up, if any. The true value may lie
+    /// beyond, and no interval inside the range contains it then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_edge: Option<Edge>,
-    /// What was searched in the end, where the search went on past that end: the posterior is inside of
-    /// this range.
+    /// The final search range, if the search was extended beyond that end; it contains the
+    /// posterior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub searched: Option<[f64; 2]>,
-    /// Whether the data do not see it (see [`Posterior::unseen`]): what is believed of it is the
-    /// prior, and the deviation that the data alone leave is infinite.
+    /// Whether the data do not determine it (see [`Posterior::unseen`]). Its marginal is then the
+    /// prior's, and its deviation from the data alone is infinite.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unidentified: bool,
 }
 
 impl Marginal {
-    /// Whether the interval touches an end of this range, so that values beyond would do as well.
+    /// Whether the interval touches an end of this range, so that values beyond it may fit as well.
     #[must_use]
     pub fn reaches_an_end_of(&self, range: [f64; 2]) -> bool {
         let [low, high] = self.interval95;
@@ -72,21 +72,23 @@ pub struct Direction {
     pub weights: Vec<(String, f64)>,
 }
 
-/// Outer share of the prior's range that is asked for a pile.
+/// Outer share of the prior's range in which a pile is sought.
 const OUTER: f64 = 0.1;
 
-/// A pile holds at least this many times what the prior puts into the outer share. A posterior that
-/// falls off from the edge with a deviation of a quarter of the range holds just that; a wider one tells
-/// too little to speak of a pile.
+/// A pile holds at least this many times the prior's mass in the outer share. A posterior that
+/// falls off from the edge with a deviation of a quarter of the range just reaches it. A wider one
+/// says too little to be called a pile.
 const PILE: f64 = 3.0;
 
-/// An interval touches the edge if it ends nearer to it than this share of its width. The interval of a
-/// normal distribution cut at its mean ends at 0.014 of its width, an exponential one's at 0.007, one
-/// cut two deviations below its mean at 0.09.
+/// An interval touches the edge if its distance from it is below this share of its width. The
+/// interval of a normal distribution cut at its mean ends at 0.014 of its width, that of an
+/// exponential one at 0.007, that of one cut two deviations below its mean at 0.09.
 const TOUCH: f64 = 0.05;
 
-/// At which end of its range a posterior piles up, from positions in the range (0 to 1) with their
-/// weights, which sum to 1. A single value is no distribution and piles up nowhere.
+/// The end of its range at which a posterior piles up; `None` where it does not.
+///
+/// `positions` in the range are 0 to 1, and their weights sum to 1. A single value is no
+/// distribution and never piles up.
 fn edge(positions: &[f64], weights: &[f64]) -> Option<Edge> {
     if positions.len() < 2 {
         return None;
@@ -115,23 +117,25 @@ pub struct Posterior {
     pub samples: Vec<Vec<f64>>,
     /// Weights of the samples; they sum to 1.
     pub weights: Vec<f64>,
-    /// Combinations of unknowns that the data do not see, where the identifier looked for them;
-    /// along these the samples are the prior's.
+    /// Combinations of unknowns that the data do not determine, if the identifier looked for them.
+    /// Along these the samples are those of the prior.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unseen: Vec<Direction>,
 }
 
-/// An unknown is unidentified if this share of its own direction (a squared cosine) lies in what the data do
-/// not see. Below it nine tenths of it and more are seen.
+/// An unknown is unidentified if this share of its direction (a squared cosine) lies in the
+/// subspace that the data do not determine. Otherwise at least nine tenths of it are determined.
 const SHARE: f64 = 0.1;
 
 impl Posterior {
-    /// Summarises weighted samples: `samples` is `n x d`, one row a sample and one entry a parameter, in its unit; `weights` are `n`
-    /// numbers from 0 on, which need not sum to 1.
+    /// Summarises weighted samples.
+    ///
+    /// `samples` is `n x d`, one row a sample and one entry a parameter, in its unit. `weights` are
+    /// `n` numbers of at least 0, which need not sum to 1.
     ///
     /// # Panics
-    /// Where there are not as many weights as samples, a sample has fewer entries than there are parameters, or the weights do not sum to
-    /// a number above 0.
+    /// When the numbers of weights and samples differ, a sample has fewer entries than there are
+    /// parameters, or the weights do not sum to a number above 0.
     #[must_use]
     pub fn from_samples(parameters: &[Parameter], samples: Vec<Vec<f64>>, weights: &[f64]) -> Self {
         let (n, d) = (samples.len(), parameters.len());
@@ -156,7 +160,7 @@ impl Posterior {
             .map(|(i, p)| {
                 let values: Vec<f64> = samples.iter().map(|s| s[i]).collect();
                 let mean: f64 = values.iter().zip(&weights).map(|(x, w)| x * w).sum();
-                // Rounding can carry the mean of values that are all alike past them.
+                // By rounding, the mean of equal values can differ from them.
                 let low = values.iter().copied().fold(f64::INFINITY, f64::min);
                 let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 let mean = if mean < low {
@@ -196,7 +200,7 @@ impl Posterior {
         }
     }
 
-    /// Says which directions the data do not see, and marks the unknowns that lie in them.
+    /// Sets the directions that the data do not determine, and marks the unknowns that lie in them.
     #[must_use]
     pub fn with_unseen(mut self, unseen: Vec<Direction>) -> Self {
         for marginal in &mut self.marginals {
@@ -208,8 +212,8 @@ impl Posterior {
         self
     }
 
-    /// The prior as `n` equally weighted samples: a stratified draw in each
-    /// parameter, in an order of its own.
+    /// The prior as `n` equally weighted samples: a stratified draw in each parameter, in
+    /// independent order.
     #[must_use]
     pub fn prior(parameters: &[Parameter], n: usize, rng: &mut Rng) -> Self {
         let mut samples = vec![vec![0.0; parameters.len()]; n];
@@ -249,7 +253,8 @@ impl Posterior {
     }
 }
 
-/// Quantile of weighted values, interpolated between the middles of their weights.
+/// Quantile of weighted values, interpolated between the midpoints of their weights.
+///
 /// `weights` sum to 1.
 #[must_use]
 pub fn weighted_quantile(values: &[f64], weights: &[f64], q: f64) -> f64 {
@@ -307,7 +312,7 @@ mod tests {
     #[test]
     fn the_mean_of_samples_that_are_alike_is_that_sample() {
         for n in 1..2000 {
-            // Weights whose rounded sum is not 1, as those of a comparison of models.
+            // Weights whose rounded sum is not 1, like those of a comparison of models.
             let weights: Vec<f64> = (0..n).map(|i| 1.0 / (1.0 + f64::from(i % 7))).collect();
             let samples = vec![vec![1.0]; n as usize];
             let posterior = Posterior::from_samples(&[parameter()], samples, &weights);
@@ -315,7 +320,7 @@ mod tests {
         }
     }
 
-    /// The edge of a posterior whose quantiles are those of `at`, a function of 0 to 1.
+    /// The edge of a posterior with the quantile function `at`, defined on 0 to 1.
     fn edge_of(at: impl Fn(f64) -> f64) -> Option<Edge> {
         let n = 2000;
         let samples = (0..n).map(|i| vec![at((f64::from(i) + 0.5) / f64::from(n))]);
@@ -326,7 +331,7 @@ mod tests {
 
     #[test]
     fn a_pile_at_an_edge_is_named() {
-        // Exponential fall-off from either end, by a twentieth of the range.
+        // Exponential decay from either end, by a twentieth of the range.
         let fall = |q: f64| -0.05 * (1.0 - q).ln();
         assert_eq!(edge_of(|q| fall(q).min(1.0)), Some(Edge::Low));
         assert_eq!(edge_of(|q| 1.0 - fall(q).min(1.0)), Some(Edge::High));
@@ -336,11 +341,11 @@ mod tests {
 
     #[test]
     fn a_posterior_inside_and_one_that_knows_nothing_pile_up_nowhere() {
-        // The prior itself, a narrow one close to the edge, and one that knows little.
+        // The prior itself, a narrow posterior close to the edge, and an uninformative one.
         assert_eq!(edge_of(|q| q), None);
         assert_eq!(edge_of(|q| 0.01 + 0.005 * q), None);
         assert_eq!(edge_of(|q| q.powf(1.5)), None);
-        // A logistic one, cut nowhere, three of its scales from the edge at the 2.5 % quantile.
+        // A logistic one, not cut, whose 2.5 % quantile is three of its scales from the edge.
         assert_eq!(
             edge_of(|q| (0.2 + 0.02 * (q / (1.0 - q)).ln()).max(0.0)),
             None

@@ -1,4 +1,4 @@
-//! What an algorithm is given: a task, an engine, the unknowns, seed and threads.
+//! Input of an algorithm: a task, an engine, the unknowns, seed and threads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,19 +17,19 @@ use crate::task::Task;
 pub struct Problem<'a> {
     /// The task.
     pub task: &'a dyn Task,
-    /// The scene compiled by the engine that the method may use.
+    /// The scene, compiled by the engine that the method may use.
     pub model: &'a dyn Model,
-    /// What that engine can do.
+    /// Capabilities of that engine.
     pub capabilities: Capabilities,
     /// The unknowns.
     pub parameters: &'a [Parameter],
-    /// What is tracked, with the noise that is assumed.
+    /// The tracked signals, with their assumed noise.
     pub signals: &'a [Signal],
     /// Threads; 0 for one a core.
     pub threads: usize,
-    /// Streams of chance.
+    /// Random streams.
     pub streams: Streams,
-    /// Where progress is told to.
+    /// Receiver of progress reports.
     pub progress: &'a dyn Progress,
     /// Physics steps taken so far.
     pub physics_counter: &'a AtomicU64,
@@ -101,7 +101,7 @@ pub fn substeps(layout: &Layout, frame_period: f64) -> Result<usize> {
     Ok(whole as usize)
 }
 
-/// Positions and velocities of the first keyframe; zeros with unit quaternions where there is none.
+/// Positions and velocities of the first keyframe; without one, zeros with unit quaternions.
 #[must_use]
 pub fn home(layout: &Layout) -> (Vec<f64>, Vec<f64>) {
     if let Some(key) = layout.keyframes.first() {
@@ -171,7 +171,8 @@ impl Batch {
 mod tests {
     use super::*;
 
-    /// Symptom: "config timestep", a key that no configuration has. Cause: the step is the model's.
+    /// Symptom: "config timestep", a key that no configuration has. Cause: the time step belongs to
+    /// the model.
     #[test]
     fn a_frame_that_no_steps_fill_names_the_models_option() {
         let layout = Layout {

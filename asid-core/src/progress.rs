@@ -1,28 +1,34 @@
-//! How long work tells that it goes on, and learns that it should stop.
+//! How long work reports its progress and learns that it should stop.
 
-/// Where progress is told to. Libraries never print.
+/// Receiver of progress reports. Libraries never print.
 pub trait Progress: Sync {
     /// A stage begins; `total` units of work are expected.
     fn begin(&self, stage: &str, total: u64);
-    /// Some units are done.
+    /// `units` of work are done.
     fn advance(&self, units: u64);
-    /// The present figure of merit, in words.
+    /// Reports the current figure of merit, as text.
     fn note(&self, _text: &str) {}
-    /// How the explanations tried so far rank, best first: each with its figure of merit. `stage` says what it rests on.
+    /// Reports the ranking of the explanations tried so far, best first, each with its figure of
+    /// merit.
+    ///
+    /// `stage` says what the ranking is based on.
     fn ranking(&self, _stage: &str, _rows: &[(String, f64)]) {}
-    /// Whether the work is to end with what is known: what is under way stops at its next step, and nothing further begins.
+    /// Whether to end the work with what is known: current work stops at its next step, and nothing
+    /// further begins.
     fn is_stopped(&self) -> bool {
         false
     }
-    /// Whether the little that stopped work does for a good end, such as a last fit of the values that were found, is to stay undone too.
+    /// Whether stopped work must also skip its short conclusion, such as a last fit of the values
+    /// found.
     fn is_late(&self) -> bool {
         self.is_stopped()
     }
-    /// The stage is over.
+    /// The stage is finished.
     fn end(&self);
 }
 
-/// Progress of work that may go on until it is late: a search that has no last fit to come to, or that fit.
+/// Progress of work that may continue until it is late: a search without a last fit to follow, or
+/// that fit.
 pub struct UntilLate<'a>(pub &'a dyn Progress);
 
 impl Progress for UntilLate<'_> {
@@ -46,7 +52,7 @@ impl Progress for UntilLate<'_> {
     }
 }
 
-/// Progress that nobody looks at.
+/// Progress that nobody receives.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

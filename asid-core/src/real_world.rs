@@ -1,4 +1,4 @@
-//! The real world: what answers with one episode, and lets a task be tried once.
+//! The real world: it returns one episode, and allows one attempt at the task.
 
 use crate::episode::Episode;
 use crate::error::Result;
@@ -6,40 +6,40 @@ use crate::explore::Policy;
 use crate::solve::TaskPolicy;
 use crate::task::Outcome;
 
-/// An episode as it was, and what only a simulated world can tell of it.
+/// A recorded episode, with what only a simulated world knows about it.
 #[derive(Clone, Debug)]
 pub struct RealEpisode {
     /// The log.
     pub episode: Episode,
     /// Actions of the policy, `horizon x action`, in the task's units.
     pub actions: Vec<f64>,
-    /// Share of control steps in which the machine touched the object, as seen after every
-    /// physics step: a touch can be shorter than a frame.
+    /// Share of control steps in which the machine touched the object, checked after every physics
+    /// step, as a touch can be shorter than a frame.
     pub contact_fraction: f64,
-    /// The same share for each of the task's objects by itself.
+    /// The same share for each of the task's objects.
     pub touched: Vec<f64>,
-    /// True start pose, where it is known.
+    /// True start pose, if known.
     pub true_start: Option<Vec<f64>>,
-    /// The readings without the trackers' errors, laid out as the log's, where they are known.
+    /// The readings without the trackers' errors, in the log's layout, if known.
     pub true_readings: Option<Vec<f64>>,
 }
 
 /// One attempt at the task.
 #[derive(Clone, Debug)]
 pub struct Attempt {
-    /// What came of it.
+    /// The result.
     pub outcome: Outcome,
     /// The action.
     pub action: Vec<f64>,
-    /// Start pose that the machine believed in.
+    /// Start pose that the machine assumed.
     pub believed_start: Vec<f64>,
     /// Readings of the task's channels, `frames x width`.
     pub readings: Vec<f64>,
-    /// The log: commands, and what trackers and the machine's own sensors read.
+    /// The log: commands, and the readings of trackers and the machine's own sensors.
     pub episode: Episode,
 }
 
-/// What can be explored once and tried once.
+/// A world that can be explored once and tried once.
 pub trait RealWorld {
     /// Plays a policy for one episode.
     ///

@@ -1,9 +1,9 @@
-//! Finds backends, tasks, explorers, identifiers and solvers by name. Other crates add kinds of
-//! their own, such as effects: a type that is an [`Entry`].
+//! Finds backends, tasks, explorers, identifiers and solvers by name. Other crates add further
+//! kinds, such as effects: types that implement [`Entry`].
 //!
-//! What is linked in registers itself: one [`register!`](crate::register) in the
-//! author's crate, no list to edit. What is loaded at run time is [`add`]ed. Lists
-//! come out sorted by name, so that nothing depends on the order of linking.
+//! Linked-in parts register themselves: one [`register!`](crate::register) in the author's crate,
+//! with no list to edit. Parts loaded at run time are [`add`]ed. Lists are sorted by name, so that
+//! nothing depends on the order of linking.
 
 use std::sync::{PoisonError, RwLock};
 
@@ -24,11 +24,11 @@ pub use origin::{Origin, Package};
 pub struct BackendEntry {
     /// Name on the command line.
     pub name: &'static str,
-    /// One line for `asid list`.
+    /// One-line description for `asid list`.
     pub about: &'static str,
-    /// Makes it; an error says why it is missing on this machine.
+    /// Constructor; its error says why the backend is missing on this machine.
     pub make: Maker<dyn Backend>,
-    /// Where it comes from.
+    /// Its origin.
     pub origin: Origin,
 }
 
@@ -36,30 +36,30 @@ pub struct BackendEntry {
 pub struct TaskEntry {
     /// Name on the command line.
     pub name: &'static str,
-    /// One line for `asid list`.
+    /// One-line description for `asid list`.
     pub about: &'static str,
-    /// Makes it.
+    /// Constructor.
     pub make: Maker<dyn Task>,
-    /// Where it comes from.
+    /// Its origin.
     pub origin: Origin,
 }
 
-/// Makes a thing that implements `T`; a closure, for what is loaded at run time.
+/// Makes an object that implements `T`; a closure for parts loaded at run time.
 pub type Maker<T> = &'static (dyn Fn() -> Result<Box<T>> + Sync);
 
 /// An algorithm; `T` is the trait it implements.
 pub struct AlgorithmEntry<T: ?Sized + 'static> {
     /// Name on the command line.
     pub name: &'static str,
-    /// One line for `asid list`.
+    /// One-line description for `asid list`.
     pub about: &'static str,
     /// All its settings with their defaults.
     pub defaults: &'static (dyn Fn() -> Settings + Sync),
-    /// What its settings mean, for `asid config`.
+    /// Meanings of its settings, for `asid config`.
     pub meanings: &'static (dyn Fn() -> Meanings + Sync),
-    /// Makes it; settings that are left out take their defaults.
+    /// Constructor; omitted settings take their defaults.
     pub make: &'static (dyn Fn(&Settings) -> Result<Box<T>> + Sync),
-    /// Where it comes from.
+    /// Its origin.
     pub origin: Origin,
 }
 
@@ -72,13 +72,13 @@ pub type SolverEntry = AlgorithmEntry<dyn TaskSolver>;
 
 /// Something with a name that can be registered.
 pub trait Entry: inventory::Collect + Sync + Sized + 'static {
-    /// What kind of thing it is, in error messages.
+    /// The kind of entry, in error messages.
     const KIND: &'static str;
     /// Name on the command line.
     fn name(&self) -> &'static str;
-    /// One line for `asid list`.
+    /// One-line description for `asid list`.
     fn about(&self) -> &'static str;
-    /// Where it comes from.
+    /// Its origin.
     fn origin(&self) -> Origin;
     /// Entries that were added at run time.
     #[doc(hidden)]
@@ -118,7 +118,7 @@ __entry!(ExplorerEntry, "explorer");
 __entry!(IdentifierEntry, "identifier");
 __entry!(SolverEntry, "solver");
 
-/// Everything registered under a type of entry, sorted by name.
+/// All entries of a type, sorted by name.
 #[must_use]
 pub fn all<E: Entry>() -> Vec<&'static E> {
     let mut entries: Vec<&E> = inventory::iter::<E>().collect();
@@ -128,8 +128,9 @@ pub fn all<E: Entry>() -> Vec<&'static E> {
     entries
 }
 
-/// The engine that is used where none is named: the first built in that computes in single precision, whose steps cost
-/// least, for a search takes very many; else the first.
+/// The default engine: the first built-in one with single precision, else the first.
+///
+/// Single precision has the cheapest steps, and a search takes very many.
 #[must_use]
 pub fn default_backend() -> Option<&'static BackendEntry> {
     let engines = all::<BackendEntry>();
@@ -143,11 +144,11 @@ pub fn default_backend() -> Option<&'static BackendEntry> {
 
 /// Adds an entry for the rest of the process, and returns the name that it got.
 ///
-/// That is `own`, or where that is taken `OWN@plugin`, `OWN@plugin2`, …, so that what is
-/// linked in and what is loaded can be used side by side. `build` is given the name.
+/// The name is `own`, or if that is taken `OWN@plugin`, `OWN@plugin2`, …, so that linked-in and
+/// loaded parts can be used side by side. `build` gets the name.
 ///
 /// # Errors
-/// [`Error::Config`] where `own` is not made of letters, digits, `-`, `_` and `.`.
+/// [`Error::Config`] when `own` does not consist of letters, digits, `-`, `_` and `.`.
 pub fn add<E: Entry>(own: &str, build: impl FnOnce(&'static str) -> E) -> Result<&'static str> {
     check_name::<E>(own)?;
     let mut added = E::added().write().unwrap_or_else(PoisonError::into_inner);
@@ -159,7 +160,7 @@ pub fn add<E: Entry>(own: &str, build: impl FnOnce(&'static str) -> E) -> Result
     Ok(name)
 }
 
-/// Whether a name can be added.
+/// Checks that a name can be added.
 ///
 /// # Errors
 /// As those of [`add`].

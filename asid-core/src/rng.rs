@@ -1,17 +1,16 @@
 //! One seed, many independent streams.
 //!
-//! Every use of chance names its stream, so that adding one use does not shift
-//! the numbers of another, and work split over threads draws the same numbers
-//! as work that is not.
+//! Every use of random numbers names its stream. Adding one use therefore does not shift the
+//! numbers of another, and work split over threads draws the same numbers as work that is not.
 //!
-//! [`Streams::child`] keeps parts apart that trust each other: its mix can be undone, and its
-//! siblings are reached from their common root. [`Streams::sealed`] keeps apart what must not know of
-//! each other, such as a method and the real world that it is judged by.
+//! [`Streams::child`] separates parts that trust each other: its mix can be inverted, and its
+//! siblings are reachable from their common root. [`Streams::sealed`] separates parts that must not
+//! know of each other, such as a method and the real world by which it is judged.
 
 use rand::{RngCore as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// The generator used throughout.
+/// The generator used everywhere.
 pub type Rng = ChaCha8Rng;
 
 /// Source of named random streams.
@@ -45,7 +44,7 @@ impl Streams {
         Rng::seed_from_u64(mix(mix(self.seed ^ hash(name)) ^ mix(index)))
     }
 
-    /// Streams of a part of the work, independent of this one's.
+    /// Streams of a part of the work, independent of those of the whole.
     #[must_use]
     pub fn child(&self, name: &str) -> Self {
         Self {
@@ -53,14 +52,14 @@ impl Streams {
         }
     }
 
-    /// Streams that lead neither back to these nor to others that are sealed off these.
+    /// Streams from which neither these nor other sealed streams can be derived.
     ///
-    /// The new root is 64 bits of ChaCha's output under a key made of this root and the name. ChaCha is
-    /// a pseudo-random function: from its output the key can only be found by trying keys, and the
-    /// outputs of two keys tell nothing of each other. So whoever holds `sealed("a")` can name any
-    /// stream and any child, and still draws no number of `sealed("b")`. One way is enough: what is
-    /// sealed is given away alone, never with the root. It is no lock against someone who guesses the
-    /// root, which is often a small number; it makes sure that nobody gets there without meaning to.
+    /// The new root is 64 bits of ChaCha's output under a key made of this root and the name.
+    /// ChaCha is a pseudo-random function: the key can only be found by trying keys, and the
+    /// outputs of two keys are unrelated. The holder of `sealed("a")` can name any stream and any
+    /// child, and still draws no number of `sealed("b")`. One direction suffices, because sealed
+    /// streams are passed on alone, never with the root. The root is often a small number, so this
+    /// does not protect against guessing it. It only prevents unintended access.
     #[must_use]
     pub fn sealed(&self, name: &str) -> Self {
         let key = mix(self.seed ^ hash(name).rotate_left(31));
@@ -107,8 +106,8 @@ mod tests {
         }
     }
 
-    /// Names that a method might try are of no use to it: neither a stream, nor a child, nor another
-    /// seal of what it holds draws what the world draws.
+    /// Names that a method might try do not help it: neither a stream, nor a child, nor another
+    /// seal of what it holds draws the world's numbers.
     #[test]
     fn sealed_streams_do_not_lead_to_each_other() {
         const NAMES: [&str; 8] = [

@@ -1,9 +1,8 @@
 //! A scene: one MJCF document that every backend loads.
 //!
-//! MJCF is the common language of the engines, so the scene *is* the document
-//! and nothing more. Includes are spliced in when it is read, by text and not
-//! by an engine, so that every engine sees the same bytes and `asid export`
-//! writes exactly what was simulated.
+//! MJCF is the common language of the engines, so the scene *is* the document and nothing more.
+//! Includes are spliced in as text when it is read, not by an engine. Every engine therefore sees
+//! the same bytes, and `asid export` writes exactly what was simulated.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -19,7 +18,7 @@ pub struct Scene {
     name: String,
     xml: String,
     directory: Option<PathBuf>,
-    /// The parsed document, once it was asked for; clones share it.
+    /// The parsed document, once requested; clones share it.
     description: Arc<OnceLock<Arc<mjcf_rs::Model>>>,
 }
 
@@ -54,8 +53,8 @@ impl Scene {
         Self::checked(name, xml, Some(directory))
     }
 
-    /// A document held in memory; `includes` are pairs of file name, as written
-    /// in the document, and text.
+    /// A document in memory; `includes` are pairs of file name, as written in the document, and
+    /// text.
     ///
     /// # Errors
     /// As [`Scene::from_file`].
@@ -106,27 +105,29 @@ impl Scene {
         }
     }
 
-    /// Path or name it was read by.
+    /// Path or name under which it was read.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The whole document, includes spliced in.
+    /// The whole document, with includes spliced in.
     #[must_use]
     pub fn xml(&self) -> &str {
         &self.xml
     }
 
-    /// Folder that relative asset paths start from; `None` for a scene from memory.
+    /// Base folder of relative asset paths; `None` for a scene from memory.
     #[must_use]
     pub fn directory(&self) -> Option<&Path> {
         self.directory.as_deref()
     }
 
-    /// The parsed document, with defaults resolved, for what is read from a
-    /// scene without an engine (kinematics, mass properties, names). It is parsed
-    /// once: an arm's controller, which a solver makes for each attempt, costs no parsing.
+    /// The parsed document with defaults resolved, for what is read from a scene without an engine
+    /// (kinematics, mass properties, names).
+    ///
+    /// It is parsed once. A solver makes an arm's controller for each attempt, which then costs no
+    /// parsing.
     ///
     /// # Errors
     /// When the document is not valid MJCF.
@@ -182,7 +183,7 @@ impl Scene {
         match node.attribute_node(attribute) {
             Some(found) => xml.replace_range(found.range_value(), value),
             None => {
-                // Behind the tag's name.
+                // Insert after the tag's name.
                 let at = node.range().start + 1 + tag.len();
                 xml.insert_str(at, &format!(" {attribute}=\"{value}\""));
             }
@@ -203,8 +204,8 @@ impl Scene {
         }
         let document = parse(&self.name, &self.xml)?;
         let value = format!("{timestep:?}");
-        // The last value of a repeated section wins, so an option element at
-        // the end settles it whatever the document said before.
+        // The last value of a repeated section wins, so an option element at the end overrides the
+        // document.
         let end = document.root_element().range().end;
         let close = self.xml[..end].rfind("</").ok_or_else(|| Error::Scene {
             scene: self.name.clone(),
@@ -291,8 +292,8 @@ mod tests {
         assert!(error.to_string().contains("cycle"), "{error}");
     }
 
-    /// Symptom: a document of 260 kB ended the process by an overflow of the stack. Cause: 25 000 elements inside of
-    /// each other, which the parser of XML follows by recursion.
+    /// Symptom: a document of 260 kB ended the process by a stack overflow. Cause: 25 000 nested
+    /// elements, which the XML parser follows by recursion.
     #[test]
     fn elements_that_are_nested_without_end_are_refused() {
         let nested = |n: usize| {
@@ -306,7 +307,8 @@ mod tests {
         assert!(Scene::from_xml("deep", &nested(asid_documents::xml::MAX_LEVELS - 2), &[]).is_ok());
     }
 
-    /// Symptom: "index out of bounds: the len is 3 but the index is 3" from the parser of MJCF. Cause: a fourth axis.
+    /// Symptom: "index out of bounds: the len is 3 but the index is 3" from the MJCF parser. Cause:
+    /// a fourth axis.
     #[test]
     fn an_order_of_four_euler_axes_is_refused() {
         let xml = |axes: &str| {

@@ -40,10 +40,11 @@ fn check_finite(section: &str, table: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Checks rules that settings keep: each is a key below `section`, whether its value is good, and what it must be.
+/// Checks rules on settings: each is a key below `section`, whether its value is valid, and what it
+/// must be.
 ///
 /// # Errors
-/// [`Error::Config`] naming the first key whose value is not good.
+/// [`Error::Config`] naming the first key whose value is invalid.
 pub fn require(section: &str, rules: &[(&str, bool, &str)]) -> Result<()> {
     match rules.iter().find(|(_, good, _)| !good) {
         None => Ok(()),
@@ -60,10 +61,10 @@ pub fn defaults<S: Default + serde::Serialize>() -> Settings {
     toml::Table::try_from(S::default()).unwrap_or_default()
 }
 
-/// What settings mean, by key; keys of inner tables with dots, such as `cem.smoothing`.
+/// Meanings of settings, by key; keys of inner tables have dots, such as `cem.smoothing`.
 pub type Meanings = BTreeMap<String, String>;
 
-/// What the settings `S` mean: the first paragraphs of its fields' documentation.
+/// Meanings of the settings `S`: the first paragraphs of its fields' documentation.
 #[must_use]
 pub fn meanings<S: JsonSchema>() -> Meanings {
     let mut generator = SchemaGenerator::default();
@@ -74,13 +75,13 @@ pub fn meanings<S: JsonSchema>() -> Meanings {
     found
 }
 
-/// For settings of which nothing is told.
+/// The meanings of settings without documentation.
 #[must_use]
 pub fn unexplained() -> Meanings {
     Meanings::new()
 }
 
-/// The schema that a reference stands for, be it an optional one, or the schema itself.
+/// Resolves a reference to a schema, also an optional one; other schemas are returned as they are.
 fn resolved<'a>(schema: &'a Value, definitions: &'a serde_json::Map<String, Value>) -> &'a Value {
     let options = schema["anyOf"].as_array().into_iter().flatten();
     let mut references = std::iter::once(schema).chain(options);
@@ -90,7 +91,7 @@ fn resolved<'a>(schema: &'a Value, definitions: &'a serde_json::Map<String, Valu
         .unwrap_or(schema)
 }
 
-/// The values of a choice, as `One of a, b.`; empty for what is none.
+/// The values of a choice, as `One of a, b.`; empty for a schema that is no choice.
 fn choices(schema: &Value, definitions: &serde_json::Map<String, Value>) -> String {
     let schema = resolved(schema, definitions);
     let plain = schema["enum"].as_array().into_iter().flatten();
@@ -103,7 +104,7 @@ fn choices(schema: &Value, definitions: &serde_json::Map<String, Value>) -> Stri
     format!("One of {}.", names.join(", "))
 }
 
-/// Adds the properties of a schema, whose keys begin with `prefix`.
+/// Adds the properties of a schema, with `prefix` before their keys.
 fn describe(
     schema: &Value,
     definitions: &serde_json::Map<String, Value>,
@@ -118,7 +119,7 @@ fn describe(
         let key = format!("{prefix}{key}");
         let text = property["description"].as_str().unwrap_or_default();
         let paragraph = text.split("\n\n").next().unwrap_or(text);
-        // Links to Rust items read as the items' names.
+        // Links to Rust items become the items' names.
         let plain = paragraph.replace("[`", "`").replace("`]", "`");
         let meaning =
             asid_documents::guard::one_line(&format!("{plain} {}", choices(property, definitions)));

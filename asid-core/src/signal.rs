@@ -1,13 +1,13 @@
-//! Tracked signals: what a tracker reads in the real world.
+//! Tracked signals: what a tracker measures in the real world.
 
 use nalgebra::{Quaternion, UnitQuaternion};
 
-/// A sensor that a tracker reads in the real world, with its noise.
+/// A sensor that a tracker measures in the real world, with its noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
     /// Name of the sensor in the scene.
     pub sensor: String,
-    /// Standard deviation of the noise of each entry; of each rotation angle for an orientation.
+    /// Standard deviation of the noise of each entry; for an orientation, of each rotation angle.
     pub noise: f64,
 }
 
@@ -17,8 +17,9 @@ pub fn unit_quaternion(wxyz: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]))
 }
 
-/// Rotation vector (rad, world frame) that turns `b` into `a`, both `w x y z`;
-/// the sign of a quaternion means nothing. NaN where either is not finite.
+/// Rotation vector (rad, world frame) that turns `b` into `a`, both `w x y z`.
+///
+/// The sign of a quaternion is irrelevant. NaN where either is not finite.
 #[must_use]
 pub fn rotation_difference(a: &[f64], b: &[f64]) -> [f64; 3] {
     if a.iter().chain(b).any(|x| !x.is_finite()) {

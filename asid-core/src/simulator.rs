@@ -1,13 +1,12 @@
 //! A batch of simulations of one scene.
 //!
-//! Everything is a call on the whole batch with caller-owned, row-major arrays
-//! of `f64`, one row a simulation: that is what makes an engine behind it fast
-//! (one call, all cores, no allocation), what makes it a C table (an engine
-//! plugin is such a table), and what makes results independent of the number
-//! of threads. The price is that a single simulation is a batch of one.
+//! Everything is a call on the whole batch with caller-owned, row-major arrays of `f64`, one row a
+//! simulation. This makes an engine fast (one call, all cores, no allocation), allows it to be a C
+//! table (as an engine plugin is), and makes results independent of the number of threads. The
+//! price is that a single simulation is a batch of one.
 //!
-//! A *frame* is the interval at which commands change and readings are
-//! recorded; it takes one or more physics steps (`substeps`).
+//! A *frame* is the interval at which commands change and readings are recorded; it takes one or
+//! more physics steps (`substeps`).
 
 mod checks;
 
@@ -22,40 +21,40 @@ pub use checks::{check_copy, check_len, check_sims, check_state};
 /// State of one simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Status {
-    /// It runs.
+    /// The simulation runs.
     #[default]
     Running,
-    /// Its state left the finite or plausible range. It stands still, records
-    /// NaN, and takes no part until it is reset, loaded or copied into.
+    /// Its state left the finite or plausible range. It stands still, records NaN, and takes no
+    /// part until it is reset, loaded or copied into.
     Diverged {
-        /// Simulated time at which it was seen, s.
+        /// Simulated time at which the divergence was detected, s.
         time: f64,
-        /// What the engine said.
+        /// The engine's message.
         message: String,
     },
 }
 
 impl Status {
-    /// True where it runs.
+    /// Whether it runs.
     #[must_use]
     pub fn is_running(&self) -> bool {
         matches!(self, Self::Running)
     }
 }
 
-/// How a batch is made.
+/// Configuration of a batch.
 #[derive(Clone, Debug, Default)]
 pub struct BatchConfig {
     /// Number of simulations.
     pub size: usize,
     /// Threads; 0 for one a core. Results do not depend on it.
     pub threads: usize,
-    /// What [`Simulator::set_parameters`] sets, one column each.
+    /// The targets that [`Simulator::set_parameters`] sets, one column each.
     pub targets: Vec<Target>,
 }
 
 impl BatchConfig {
-    /// How many threads are asked for: as given, or one a core.
+    /// Number of threads: the given one, or one a core.
     #[must_use]
     pub fn thread_count(&self) -> usize {
         match self.threads {
@@ -65,8 +64,8 @@ impl BatchConfig {
     }
 }
 
-/// States of some simulations, opaque and exact: restored, a simulation goes on
-/// to the bit. Valid in every batch made of the same compiled scene.
+/// States of some simulations, opaque and exact: a restored simulation continues to the bit. It is
+/// valid in every batch of the same compiled scene.
 #[derive(Clone)]
 pub struct Snapshot {
     data: Arc<dyn Any + Send + Sync>,
@@ -88,23 +87,23 @@ impl Snapshot {
         }
     }
 
-    /// Number of states in it.
+    /// Number of states that it holds.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// The engine's own data, where it is of type `T`.
+    /// The engine's own data, if it is of type `T`.
     #[must_use]
     pub fn data<T: Any>(&self) -> Option<&T> {
         self.data.downcast_ref()
     }
 
-    /// The data from which `rows` are to be restored into as many of `sims`; `is_own` says whether it is of the same
-    /// compiled scene.
+    /// The data from which `rows` are restored into as many of `sims`; `is_own` says whether it is
+    /// of the same compiled scene.
     ///
     /// # Errors
-    /// [`Error::Shape`] where it is of another scene, or holds no such row.
+    /// [`Error::Shape`] when it is of another scene, or has no such row.
     pub fn restored<T: Any>(
         &self,
         rows: &[usize],
@@ -142,7 +141,7 @@ pub struct ExternalForce<'a> {
     pub wrench: &'a [f64],
 }
 
-/// A parameter that takes another value from some frame on.
+/// A parameter that takes another value from a given frame on.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterChange<'a> {
     /// First frame with the new value.
@@ -153,7 +152,7 @@ pub struct ParameterChange<'a> {
     pub values: &'a [f64],
 }
 
-/// What a [`StepHook`] sees of a simulation before a physics step, and may change.
+/// What a [`StepHook`] sees of a simulation before a physics step, and what it may change.
 #[derive(Debug)]
 pub struct StepView<'a> {
     /// Simulated time since the last reset or load, s.
@@ -162,26 +161,29 @@ pub struct StepView<'a> {
     pub qpos: &'a [f64],
     /// Velocities, `nv`.
     pub qvel: &'a [f64],
-    /// Command of this step, `nu`; it may be changed, for this step only.
+    /// Command of this step, `nu`; a change applies to this step only.
     pub ctrl: &'a mut [f64],
     /// Generalised force to add in this step, `nv`; zero on entry.
     pub force: &'a mut [f64],
-    /// The simulation's parameters, one a column of [`BatchConfig::targets`]; on entry as
-    /// [`Simulator::set_parameters`] left them. Where the engine has
-    /// [`LIVE_PARAMETERS`](crate::Capabilities::LIVE_PARAMETERS) friction of geoms and
-    /// joints, damping and stiffness may be changed, for this step only, and other columns
-    /// mean nothing; elsewhere it is empty.
+    /// The simulation's parameters, one for each column of [`BatchConfig::targets`].
+    ///
+    /// On entry they are as [`Simulator::set_parameters`] left them. If the engine has
+    /// [`LIVE_PARAMETERS`](crate::Capabilities::LIVE_PARAMETERS), friction of geoms and joints,
+    /// damping and stiffness may be changed, for this step only; changes of other columns are
+    /// ignored. For other engines the slice is empty.
     pub parameters: &'a mut [f64],
 }
 
-/// Physics that an engine does not have, called before each physics step of
-/// each simulation, from several threads at once.
+/// Physics that an engine lacks, called before each physics step of each simulation, from several
+/// threads at once.
 ///
-/// It is the door for effects whose force depends on the state. It costs a call
-/// a step; a rollout without a hook pays nothing.
+/// It is the interface for effects whose force depends on the state. It costs one call a step; a
+/// rollout without a hook costs nothing.
 pub trait StepHook: Sync {
-    /// Called before a physics step; `row` is the row of the rollout (not the
-    /// simulation's number), `step` the physics step since its start.
+    /// Called before a physics step.
+    ///
+    /// `row` is the row of the rollout (not the simulation's number), `step` the physics step since
+    /// its start.
     fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>);
 }
 
@@ -192,7 +194,7 @@ pub struct Rollout<'a> {
     pub sims: &'a [usize],
     /// Number of frames.
     pub frames: usize,
-    /// Physics steps a frame.
+    /// Physics steps per frame.
     pub substeps: usize,
     /// Commands.
     pub control: Control<'a>,
@@ -200,10 +202,10 @@ pub struct Rollout<'a> {
     pub forces: &'a [ExternalForce<'a>],
     /// Parameter changes, by frame.
     pub changes: &'a [ParameterChange<'a>],
-    /// Physics the engine lacks.
+    /// Hook with physics that the engine lacks.
     pub hook: Option<&'a dyn StepHook>,
-    /// What is recorded at the end of each frame: the state then, before any
-    /// later command acts.
+    /// What is recorded at the end of each frame: the state at that time, before any later command
+    /// acts.
     pub record: &'a Recording,
 }
 
@@ -232,46 +234,50 @@ impl<'a> Rollout<'a> {
 
 /// A batch of `n` simulations of one scene, with their own states and parameters.
 ///
-/// All methods take the simulations they act on as strictly increasing indices
-/// and check the lengths of arrays. Errors are about the call; what happens to
-/// one simulation is in [`Simulator::status`] and never disturbs the others.
+/// All methods take the simulations they act on as strictly increasing indices and check the
+/// lengths of arrays. Errors concern the call. What happens to one simulation is in
+/// [`Simulator::status`] and never disturbs the others.
 pub trait Simulator: Send {
-    /// Names and places.
+    /// Names and indices.
     fn layout(&self) -> &Layout;
 
     /// Number of simulations, `n`.
     fn batch_size(&self) -> usize;
 
     /// Sets the parameters of some simulations: `sims x columns`, in the order of
-    /// [`BatchConfig::targets`]. States stay as they are.
+    /// [`BatchConfig::targets`].
+    ///
+    /// States stay unchanged.
     ///
     /// # Errors
-    /// When a length does not fit or a value is not finite or not physical
-    /// (a negative mass or friction).
+    /// When a length does not fit or a value is not finite or not physical (a negative mass or
+    /// friction).
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()>;
 
-    /// Puts simulations into the scene's first keyframe, or its default state
-    /// where it has none, at time zero with no memory of before.
+    /// Resets simulations to the scene's first keyframe, or its default state without one, at time
+    /// zero and without memory.
     ///
     /// # Errors
     /// When `sims` do not fit.
     fn reset(&mut self, sims: &[usize]) -> Result<()>;
 
-    /// Sets positions (`sims x nq`) and velocities (`sims x nv`); quaternions
-    /// are normalised. Contacts are found anew; time and parameters stay.
+    /// Sets positions (`sims x nq`) and velocities (`sims x nv`); quaternions are normalised.
+    ///
+    /// Contacts are detected anew; time and parameters stay unchanged.
     ///
     /// # Errors
     /// When a length does not fit or a value is not finite.
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()>;
 
     /// Runs a rollout and writes `sims x frames x record.width()` readings.
-    /// Rows of a simulation that has diverged are NaN from that frame on.
+    ///
+    /// Rows of a diverged simulation are NaN from that frame on.
     ///
     /// # Errors
     /// When an array does not fit.
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()>;
 
-    /// Reads the present state without stepping: `sims x record.width()`.
+    /// Reads the current state without stepping: `sims x record.width()`.
     ///
     /// # Errors
     /// When an array does not fit.
@@ -299,6 +305,6 @@ pub trait Simulator: Send {
     /// Status of each simulation, `n`.
     fn status(&self) -> &[Status];
 
-    /// Physics steps taken by all simulations of the batch since it was made.
+    /// Physics steps taken by all simulations of the batch since its creation.
     fn steps_taken(&self) -> u64;
 }

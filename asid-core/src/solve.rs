@@ -4,12 +4,12 @@ use crate::error::Result;
 use crate::posterior::Posterior;
 use crate::problem::Problem;
 
-/// A task policy: the action for the start pose that is seen.
+/// A task policy: gives the action for an observed start pose.
 pub trait TaskPolicy: Send {
-    /// The task action, in the task's units.
+    /// Writes the task action, in the task's units.
     ///
     /// # Errors
-    /// When it must be computed and that fails.
+    /// When the action must be computed and that fails.
     fn act(&mut self, start: &[f64], action: &mut [f64]) -> Result<()>;
 }
 
@@ -24,11 +24,11 @@ pub struct Trial {
     pub cost: f64,
 }
 
-/// A task policy and how it came about.
+/// A task policy and its search.
 pub struct Solved<'a> {
     /// The policy.
     pub policy: Box<dyn TaskPolicy + 'a>,
-    /// What was tried.
+    /// The actions that were tried.
     pub trials: Vec<Trial>,
 }
 

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
-/// The thing in a scene that a parameter changes: `element/name/attribute[/index]`,
-/// such as `geom/puck/friction/0`; `option/gravity/2` for the scene as a whole.
+/// The thing in a scene that a parameter changes: `element/name/attribute[/index]`, such as
+/// `geom/puck/friction/0`; `option/gravity/2` for the scene as a whole.
 ///
 /// | target | is | unit |
 /// |---|---|---|
@@ -20,11 +20,11 @@ use crate::error::{Error, Result};
 /// | `body/NAME/ipos/{0,1,2}` | centre of mass in its body | m |
 /// | `body/NAME/inertia/{0,1,2}` | principal moments | kg m² |
 /// | `joint/NAME/pos/{0,1,2}` | anchor of a hinge in its body; joint coordinates stay | m |
-/// | `joint/NAME/damping`, `frictionloss`, `stiffness`, `armature` | of each degree of freedom | SI |
+/// | `joint/NAME/damping`, `frictionloss`, `stiffness`, `armature` | per degree of freedom | SI |
 /// | `actuator/NAME/kp`, `kv`, `gear` | gains of a servo, ratio of a drive | SI |
 /// | `body/NAME/pos/{0,1,2}` | place in its parent, of a body that is not free; MuJoCo | m |
 /// | `joint/NAME/axis/{0,1,2}` | axis of a hinge or slide, scaled to length 1; MuJoCo | 1 |
-/// | `joint/NAME/range/{0,1}`, `springref` | limits, and where the spring rests; MuJoCo | rad or m |
+/// | `joint/NAME/range/{0,1}`, `springref` | limits, rest of the spring; MuJoCo | rad or m |
 /// | `actuator/NAME/forcerange/{0,1}` | limits of the force, before the gear; MuJoCo | N or N m |
 /// | `option/gravity/{0,1,2}` | gravity | m/s² |
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -36,7 +36,7 @@ pub struct Target {
     pub name: String,
     /// Attribute.
     pub attribute: String,
-    /// Entry of the attribute, 0 where it is a scalar.
+    /// Entry of the attribute; 0 for a scalar.
     pub index: usize,
 }
 
@@ -73,8 +73,8 @@ impl FromStr for Target {
                 ELEMENTS.join(", ")
             )));
         }
-        // A name may hold slashes, as those of scenes that dm_control attaches do, so attribute and
-        // index are read from the end: no attribute is a number.
+        // A name may hold slashes, as in scenes that dm_control attaches. Attribute and index are
+        // therefore read from the end; no attribute is a number.
         let (rest, index) = match rest.rsplit_once('/') {
             Some((before, last)) if last.bytes().all(|b| b.is_ascii_digit()) => (
                 before,

@@ -1,8 +1,7 @@
-//! A task: a scene with unknowns, how to explore it, and what to achieve in it.
+//! A task: a scene with unknowns, how to explore it, and its goal.
 //!
-//! A task describes; it runs nothing. Explorers, identifiers and solvers see the
-//! same description, whatever the task, and the arrays they pass around are laid
-//! out by it.
+//! A task describes and runs nothing. Explorers, identifiers and solvers see the same description
+//! for every task, which also defines the layout of the arrays that they exchange.
 
 mod protocol;
 mod view;
@@ -22,22 +21,22 @@ pub use view::{Outline, TopView, TrackedObject, TrackedPart};
 
 /// Turns exploration actions into commands of the actuators, feed-forward.
 pub trait Commander: Send {
-    /// Back to the start of an episode.
+    /// Returns to the start of an episode.
     fn reset(&mut self);
     /// Commands of the next control step: `frames_per_step x nu`.
     fn commands(&mut self, action: &[f64], ctrl: &mut [f64]);
 }
 
-/// A task as data: everything about it that is no computation.
+/// The data of a task: everything about it that is not computation.
 #[derive(Clone, Debug)]
 pub struct TaskSpec {
     /// Name on the command line.
     pub name: String,
-    /// One line for `asid list`.
+    /// One-line description for `asid list`.
     pub about: String,
     /// The scene.
     pub scene: Scene,
-    /// What an engine must be able to do.
+    /// Capabilities that an engine must have.
     pub requires: Capabilities,
     /// The unknowns that are identified by default.
     pub parameters: Vec<Parameter>,
@@ -45,34 +44,34 @@ pub struct TaskSpec {
     pub optional_parameters: Vec<Parameter>,
     /// The named cases of tables.
     pub conditions: Vec<Condition>,
-    /// The numbers that say how hard the task is; none where it is as it is.
+    /// The difficulties of the task; empty if none can be set.
     pub difficulty: Vec<Difficulty>,
-    /// Readings of the trackers a second, the first at the start of an episode; `None` for one at
-    /// every frame. There is one at the end of each control step, so that a policy always has it.
+    /// Readings of the trackers per second, the first at the start of an episode; `None` for one at
+    /// every frame. Each control step ends with a reading, so that a policy always has one.
     pub tracker_rate: Option<f64>,
     /// How it is explored.
     pub exploration: ExplorationProtocol,
-    /// What is to be achieved.
+    /// Its goal.
     pub downstream: DownstreamProtocol,
-    /// Corners of the box that every tracked and every own position stays in while the task is
-    /// explored, low then high, m.
+    /// Corners (low, then high, m) of the box that contains every tracked and every own position
+    /// during exploration.
     pub bounds: [[f64; 3]; 2],
-    /// The two tracked parts whose joint is in question, the one that holds first; `None`
-    /// where there are no such parts.
+    /// The two tracked parts whose joint is sought, the holding part first; `None` without such
+    /// parts.
     pub parts: Option<[TrackedPart; 2]>,
-    /// What a picture from above shows.
+    /// Content of a picture from above.
     pub top_view: TopView,
-    /// The things that are tracked, the one that the task is about first. Where none is given it is one
-    /// thing: the first signal is its position, the second its orientation.
+    /// The tracked things, with the one that the task is about first. Where none is given there is
+    /// one: the first signal is its position, the second its orientation.
     pub objects: Vec<TrackedObject>,
-    /// Parts of the plane that differ in what they tell, such as patches of a floor: figures count
-    /// where the object goes.
+    /// Regions of the plane that differ in what they tell, such as patches of a floor. Figures
+    /// count where the object goes.
     pub regions: Vec<Outline>,
 }
 
 impl TaskSpec {
-    /// A task of this name and scene that is explored and solved so; all else is empty, and the box
-    /// of positions reaches 1.5 m from the origin.
+    /// A task with this name, scene and protocols; all else is empty, and the box of positions
+    /// reaches 1.5 m from the origin.
     #[must_use]
     pub fn new(
         [name, about]: [&str; 2],
@@ -101,12 +100,12 @@ impl TaskSpec {
     }
 }
 
-/// A task as the framework sees it: its data, and what only code can say.
+/// A task as the framework sees it: its data, and what only code can express.
 ///
-/// A task writes the first seven methods, and of the next seven those that it has something to say in. The
-/// others read its [`TaskSpec`] and are not written anew.
+/// A task implements the first seven methods, and those of the next seven that it needs. The others
+/// read its [`TaskSpec`] and are not overridden.
 pub trait Task: Send + Sync {
-    /// The task as data.
+    /// The data of the task.
     fn spec(&self) -> &TaskSpec;
     /// Writes a start pose into positions (`nq`, the first keyframe on entry).
     ///
@@ -115,27 +114,28 @@ pub trait Task: Send + Sync {
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()>;
     /// The start pose that a reading of the tracked signals shows.
     fn locate(&self, signals: &[f64]) -> Vec<f64>;
-    /// A fresh commander of exploration.
+    /// Makes a commander of exploration.
     ///
     /// # Errors
     /// When the scene lacks what the commander needs.
     fn commander(&self) -> Result<Box<dyn Commander>>;
-    /// Commands of an attempt, `frames x nu`, for a task action and the start pose believed in.
+    /// Commands of an attempt, `frames x nu`, for a task action and the assumed start pose.
     ///
     /// # Errors
     /// When the scene lacks what the primitive needs.
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>>;
     /// The metric over an attempt, one value a frame, from `frames x width` readings.
     fn metric(&self, readings: &[f64]) -> Vec<f64>;
-    /// What came of an attempt.
+    /// Result of an attempt.
     fn outcome(&self, readings: &[f64]) -> Outcome;
 
-    /// Settings of an algorithm that suit this task better than the algorithm's defaults:
+    /// Settings that suit this task better than the algorithm's defaults.
+    ///
     /// `section` is `explorer`, `identifier` or `solver`, `algorithm` its name.
     fn settings(&self, _section: &str, _algorithm: &str) -> Settings {
         Settings::new()
     }
-    /// The task with some of its difficulties set, by name, the others at their defaults; `None`
+    /// The task with some of its difficulties set by name, the others at their defaults; `None`
     /// where nothing can be set.
     ///
     /// # Errors
@@ -143,34 +143,38 @@ pub trait Task: Send + Sync {
     fn adjusted(&self, _values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
         Ok(None)
     }
-    /// The task as it is set in one of its conditions; `None` where the condition is of
-    /// true values alone.
+    /// The task in one of its conditions; `None` where the condition only sets true values.
     ///
     /// # Errors
     /// When the condition's task cannot be made.
     fn under(&self, _condition: &str) -> Result<Option<Box<dyn Task>>> {
         Ok(None)
     }
-    /// What an episode or an attempt in the real world does to the truth, of which simulators
-    /// know nothing: `truth` holds the values of `parameters`.
+    /// Applies the wear of an episode or attempt in the real world to the truth, which simulators
+    /// do not know.
+    ///
+    /// `truth` holds the values of `parameters`.
     fn wear(&self, _parameters: &[Parameter], _truth: &mut [f64], _rng: &mut Rng) {}
-    /// The task's scene with another object of the same kind: what stands for a real set-up whose parts
-    /// are not those of the model. Names, unknowns and actuators are those of [`TaskSpec::scene`]. `None`
-    /// where the task has none.
+    /// The task's scene with another object of the same kind, for a real set-up whose parts differ
+    /// from the model's.
+    ///
+    /// Names, unknowns and actuators are those of [`TaskSpec::scene`]. `None` where the task has
+    /// none.
     ///
     /// # Errors
     /// When that scene cannot be made.
     fn stand_in(&self) -> Result<Option<Scene>> {
         Ok(None)
     }
-    /// What a reading of an exploration episode (tracked signals first) is worth to the task itself:
-    /// larger where the object is nearer to its goal, in the metric's unit; `None` where the task has
-    /// no goal for its object while it is explored.
+    /// The task's own reward of a reading of an exploration episode (tracked signals first).
+    ///
+    /// It is larger where the object is nearer to its goal, in the metric's unit. `None` where the
+    /// task has no goal for its object during exploration.
     fn goal_reward(&self, _reading: &[f64]) -> Option<f64> {
         None
     }
-    /// What a picture from the side shows at the end of an attempt: shapes in the
-    /// world, from one row of readings.
+    /// Content of a picture from the side at the end of an attempt: shapes in the world, from one
+    /// row of readings.
     fn side_view(&self, _readings: &[f64]) -> Vec<Outline> {
         Vec::new()
     }

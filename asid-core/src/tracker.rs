@@ -1,9 +1,9 @@
-//! When the trackers read, and what is systematically wrong with them.
+//! When the trackers measure, and their systematic errors.
 //!
 //! A camera is slower than the machine's own sensors.
 //!
-//! A log has a row a frame. Between two readings of the trackers their cells are empty, which every
-//! likelihood passes over.
+//! A log has one row a frame. Between two readings of the trackers their cells are empty, and every
+//! likelihood skips them.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,12 +11,13 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::task::Task;
 
-/// Deviations of the trackers' systematic errors, which are the same for all readings of an episode; 0 where there are none.
+/// Deviations of the trackers' systematic errors, which are the same for all readings of an
+/// episode; 0 where there are none.
 ///
-/// The defaults are what a laboratory has to reckon with: motion capture is 6 to 25 ms late from end to end
-/// (Qualisys at ETH Zurich; NIME 2021), of which drivers take out the part that they know, and its
-/// registration with the arm's base leaves 1 to 2 mm, or as much over the 0.1 to 0.3 m between
-/// markers (estimates).
+/// The defaults are what a laboratory has to reckon with: motion capture is 6 to 25 ms late from
+/// end to end (Qualisys at ETH Zurich; NIME 2021), of which drivers take out the part that they
+/// know, and its registration with the arm's base leaves 1 to 2 mm, or as much over the 0.1 to 0.3
+/// m between markers (estimates).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackerPrior {
@@ -46,7 +47,7 @@ impl TrackerPrior {
         rotation: 0.0,
     };
 
-    /// Checks that each is a deviation; `section` is the table that they stand in.
+    /// Checks that each value is a valid deviation; `section` is the table that holds them.
     ///
     /// # Errors
     /// [`Error::Config`] naming the setting.
@@ -74,7 +75,7 @@ pub struct ReadingFrames {
 }
 
 impl ReadingFrames {
-    /// Those of a task, for frames of `frame_period` seconds.
+    /// The frames with readings in a task, for frames of `frame_period` seconds.
     #[must_use]
     pub fn of(task: &dyn Task, frame_period: f64) -> Self {
         let every = task
@@ -86,7 +87,8 @@ impl ReadingFrames {
         }
     }
 
-    /// Whether there is a reading at the end of `frame`, counted from 1; 0 is the start, where there is one.
+    /// Whether there is a reading at the end of `frame`, counted from 1; frame 0 is the start,
+    /// which has one.
     #[must_use]
     pub fn has(&self, frame: usize) -> bool {
         frame.is_multiple_of(self.every)

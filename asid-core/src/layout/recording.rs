@@ -1,10 +1,10 @@
-//! What a simulator records, by name and by place.
+//! What a simulator records, by name and by index.
 
 use super::Layout;
 use crate::error::{Error, Result};
 
 impl Layout {
-    /// Resolves channel names into what a simulator records; see [`Channel`].
+    /// Resolves channel names into a recording; see [`Channel`].
     ///
     /// # Errors
     /// When a name belongs to nothing in the scene.
@@ -21,8 +21,8 @@ impl Layout {
         Ok(Recording { channels, offsets })
     }
 
-    /// Channels of the whole state: positions of all joints (`nq` entries), then velocities (`nv`), in the order of
-    /// [`Simulator::set_state`](crate::Simulator::set_state).
+    /// Channels of the whole state: positions of all joints (`nq` entries), then velocities (`nv`),
+    /// in the order of [`Simulator::set_state`](crate::Simulator::set_state).
     #[must_use]
     pub fn state_channels(&self) -> Vec<String> {
         let positions = self.joints.iter().map(|j| format!("qpos.{}", j.name));
@@ -60,11 +60,10 @@ impl Layout {
     }
 }
 
-/// Something a simulator can record.
+/// Something that a simulator can record.
 ///
-/// By name: a sensor's name; `qpos.<joint>` and `qvel.<joint>`; or
-/// `contact.<body>/<body>`, the sum of the normal forces between the geoms of
-/// two bodies (N; their descendants are not counted).
+/// By name: a sensor's name; `qpos.<joint>` and `qvel.<joint>`; or `contact.<body>/<body>`, the sum
+/// of the normal forces between the geoms of two bodies (N; their descendants are not counted).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// All entries of a sensor.
@@ -93,7 +92,7 @@ pub enum Channel {
     },
 }
 
-/// Channels to record, one after the other in a row.
+/// Channels to record, concatenated in a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
     channels: Vec<Channel>,
@@ -104,7 +103,7 @@ impl Recording {
     /// A recording of channels given by index.
     ///
     /// # Errors
-    /// [`Error::Shape`] where one lies outside the layout.
+    /// [`Error::Shape`] when one lies outside the layout.
     pub fn of(layout: &Layout, channels: &[Channel]) -> Result<Self> {
         let mut offsets = vec![0];
         let mut width = 0;
@@ -143,13 +142,13 @@ impl Recording {
         &self.channels
     }
 
-    /// Entries of one row.
+    /// Number of entries in a row.
     #[must_use]
     pub fn width(&self) -> usize {
         self.offsets.last().copied().unwrap_or(0)
     }
 
-    /// Where channel `i` lies in a row.
+    /// Range of channel `i` in a row.
     #[must_use]
     pub fn range(&self, i: usize) -> std::ops::Range<usize> {
         self.offsets[i]..self.offsets[i + 1]

@@ -1,4 +1,4 @@
-//! Where an entry comes from.
+//! The origin of an entry.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ pub struct Package {
     pub version: &'static str,
 }
 
-/// Where an entry comes from.
+/// The origin of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// Linked into this program, from this package.

@@ -1,4 +1,4 @@
-//! The one statement by which a part registers itself.
+//! The statement with which a part registers itself.
 
 /// Registers a part under a name, with the package that the statement stands in.
 ///
@@ -6,8 +6,8 @@
 /// [`TaskEntry`](crate::registry::TaskEntry), and for algorithms, which have settings,
 /// [`ExplorerEntry`](crate::registry::ExplorerEntry),
 /// [`IdentifierEntry`](crate::registry::IdentifierEntry) and
-/// [`SolverEntry`](crate::registry::SolverEntry). `meanings`, which may be left out, tells
-/// `asid config` what the settings mean: [`meanings`](crate::registry::meanings) reads it from their
+/// [`SolverEntry`](crate::registry::SolverEntry). `meanings`, which may be left out, tells `asid
+/// config` what the settings mean: [`meanings`](crate::registry::meanings) reads it from their
 /// documentation.
 ///
 /// ```
@@ -83,7 +83,7 @@ macro_rules! register {
     };
 }
 
-/// The package that the macro is called in, as the origin of what it registers.
+/// The package that calls the macro, as the origin of what it registers.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! linked_origin {

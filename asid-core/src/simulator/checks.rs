@@ -1,11 +1,11 @@
-//! What every engine checks of a call before it does anything.
+//! Checks that every engine applies to a call before it does anything.
 
 use super::{Control, Rollout};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 
 impl Rollout<'_> {
-    /// Checks every array's length against the batch, for engines to call first.
+    /// Checks every array's length against the batch; engines call it first.
     ///
     /// # Errors
     /// [`crate::Error::Shape`], naming the array, or a body that has two forces.
@@ -88,10 +88,11 @@ pub fn check_sims(sims: &[usize], batch_size: usize) -> Result<()> {
     Ok(())
 }
 
-/// Checks the positions (`sims x nq`) and velocities (`sims x nv`) that `sims` simulations of a batch are to take.
+/// Checks the positions (`sims x nq`) and velocities (`sims x nv`) to set in `sims` simulations of
+/// a batch.
 ///
 /// # Errors
-/// [`Error::Shape`] where a length does not fit or a value is not finite.
+/// [`Error::Shape`] when a length does not fit or a value is not finite.
 pub fn check_state(layout: &Layout, sims: usize, qpos: &[f64], qvel: &[f64]) -> Result<()> {
     check_len("qpos", qpos.len(), sims * layout.nq)?;
     check_len("qvel", qvel.len(), sims * layout.nv)?;
@@ -99,10 +100,10 @@ pub fn check_state(layout: &Layout, sims: usize, qpos: &[f64], qvel: &[f64]) -> 
     check_finite("qvel", qvel)
 }
 
-/// Checks which simulations' states are copied into which others.
+/// Checks the simulations between which states are copied.
 ///
 /// # Errors
-/// [`Error::Shape`] where an index lies outside the batch, or one is copied from and to.
+/// [`Error::Shape`] when an index lies outside the batch, or is copied both from and to.
 pub fn check_copy(from: &[usize], to: &[usize], batch_size: usize) -> Result<()> {
     check_sims(to, batch_size)?;
     check_len("from", from.len(), to.len())?;

@@ -1,4 +1,4 @@
-//! How a task is explored, tried and judged, as data.
+//! Data on how a task is explored, attempted and judged.
 
 use crate::signal::Signal;
 
@@ -43,13 +43,13 @@ impl Coordinate {
     }
 }
 
-/// A named case that a task is tried in, such as `left`: true values, or a goal.
+/// A named case of a task, such as `left`: true values, or a goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     /// Name in tables.
     pub name: String,
-    /// Smallest and largest true value by parameter name, equal where the value is fixed;
-    /// they may lie outside the prior. Of a parameter without an entry the whole prior is drawn from.
+    /// Smallest and largest true value by parameter name, equal for a fixed value; they may lie
+    /// outside the prior. A parameter without an entry is drawn from the whole prior.
     pub truth: Vec<(String, [f64; 2])>,
 }
 
@@ -63,7 +63,7 @@ impl Condition {
         }
     }
 
-    /// A condition whose true values are drawn from ranges, and from the prior where none is given.
+    /// A condition whose true values are drawn from ranges, or from the prior for other parameters.
     #[must_use]
     pub fn drawn(name: &str, ranges: &[(&str, [f64; 2])]) -> Self {
         Self {
@@ -86,7 +86,7 @@ pub struct ExplorationProtocol {
     pub action: Vec<Coordinate>,
     /// Start pose of the object, drawn uniformly.
     pub start: Vec<Coordinate>,
-    /// What a tracker reads of the object: the likelihood's data.
+    /// What a tracker measures of the object: the data of the likelihood.
     pub signals: Vec<Signal>,
     /// Sensors of the machine itself, for policies and logs.
     pub proprioception: Vec<String>,
@@ -101,7 +101,7 @@ impl ExplorationProtocol {
         self.horizon * self.frames_per_step
     }
 
-    /// Names of all sensors of a reading's row: tracked signals, then proprioception.
+    /// Names of all sensors in a row of readings: tracked signals, then proprioception.
     #[must_use]
     pub fn channels(&self) -> Vec<String> {
         let tracked = self.signals.iter().map(|s| s.sensor.clone());
@@ -109,7 +109,7 @@ impl ExplorationProtocol {
     }
 }
 
-/// What is to be achieved, and how it is measured.
+/// The goal of a task, and how its success is measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DownstreamProtocol {
     /// Name of the metric, such as `tilt_deg`.
@@ -118,7 +118,7 @@ pub struct DownstreamProtocol {
     pub unit: String,
     /// The rule of success, in words.
     pub rule: String,
-    /// The metric's limit in the rule, where it has one.
+    /// The metric's limit in the rule, if any.
     pub threshold: Option<f64>,
     /// Frames of an attempt.
     pub frames: usize,
@@ -134,13 +134,13 @@ pub struct DownstreamProtocol {
     pub phases: Vec<(String, f64, f64)>,
 }
 
-/// What came of an attempt.
+/// Result of an attempt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
     /// The metric.
     pub value: f64,
     /// The task's own success rule.
     pub success: bool,
-    /// What a solver minimises: the metric, with penalties that lead towards success.
+    /// Cost that a solver minimises: the metric, with penalties that lead towards success.
     pub cost: f64,
 }

@@ -1,22 +1,22 @@
-//! What a task's pictures and figures show.
+//! Geometry for a task's pictures and figures.
 
 use crate::target::Target;
 
 /// A shape seen from above or from the side, for pictures; m.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outline {
-    /// What it is.
+    /// Name of the thing.
     pub label: String,
     /// Corners, in order.
     pub corners: Vec<[f64; 2]>,
 }
 
-/// What a picture of the scene from above shows.
+/// Content of a picture of the scene from above.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TopView {
     /// The object in its own frame.
     pub object: Outline,
-    /// Things that stand still, in the world frame.
+    /// Static things, in the world frame.
     pub fixtures: Vec<Outline>,
     /// Corners of the picture: low then high.
     pub bounds: [[f64; 2]; 2],
@@ -31,17 +31,17 @@ pub struct TrackedPart {
     pub orientation: String,
 }
 
-/// A thing that is tracked, as pictures and figures know it.
+/// A tracked thing, as used by pictures and figures.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackedObject {
-    /// What it is, and its shape in its own frame.
+    /// Its name, and its shape in its own frame.
     pub outline: Outline,
-    /// Sensor of its position, of which the first two entries are its place in the plane, m.
+    /// Sensor of its position; the first two entries are its position in the plane, m.
     pub position: String,
-    /// Sensor of its orientation, where that is tracked.
+    /// Sensor of its orientation, if that is tracked.
     pub orientation: Option<String>,
     /// Pairs of bodies whose contact counts as the machine touching it.
     pub contact: Vec<[String; 2]>,
-    /// Its mass in the scene, where one number sets it.
+    /// Its mass in the scene, if a single number sets it.
     pub mass: Option<Target>,
 }
