@@ -1,7 +1,7 @@
-//! Objects of the other side, wrapped: each call crosses the [`Border`].
+//! Wrapped objects of the other side: each call crosses the [`Border`].
 //!
-//! The same wrapper serves both ways: a plugin's task in this program, and this
-//! program's simulator in a plugin.
+//! The same wrapper serves both directions: a plugin's task in this program, and this program's
+//! simulator in a plugin.
 
 mod algorithm;
 mod engine;
@@ -14,7 +14,7 @@ use super::border::Border;
 use asid_core::error::Result;
 use asid_core::simulator::{StepHook, StepView};
 
-/// An object of the other side, or of this one for the other.
+/// An object of the other side, or an object of this side for the other.
 pub struct Across<T> {
     inner: ManuallyDrop<T>,
     border: Border,
@@ -22,7 +22,7 @@ pub struct Across<T> {
 }
 
 impl<T> Across<T> {
-    /// Wraps an object for calls that go this way.
+    /// Wraps an object for calls in this direction.
     pub fn new(inner: T, border: Border) -> Self {
         Self {
             inner: ManuallyDrop::new(inner),
@@ -31,7 +31,7 @@ impl<T> Across<T> {
         }
     }
 
-    /// As [`Across::new`], under the name that it is registered by.
+    /// As [`Across::new`], under the registered name.
     pub fn named(inner: T, border: Border, name: &'static str) -> Self {
         let mut across = Self::new(inner, border);
         across.name = Some(name);

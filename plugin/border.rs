@@ -14,17 +14,17 @@ pub struct Loaded {
     pub panics: Panics,
 }
 
-/// Which way a call goes. This code runs in the host either way.
+/// Direction of a call. In either direction this code runs in the host.
 #[derive(Clone, Copy)]
 pub enum Border {
     /// Into the plugin: the object is the plugin's.
     Inward(&'static Loaded),
-    /// Out of the plugin: the object is the host's, the plugin calls it.
+    /// Out of the plugin: the object is the host's, and the plugin calls it.
     Outward(&'static Loaded),
 }
 
 impl Border {
-    /// The border as an argument of the call meets it.
+    /// The border as seen by an argument of the call.
     pub fn back(self) -> Self {
         match self {
             Self::Inward(p) => Self::Outward(p),
@@ -32,7 +32,7 @@ impl Border {
         }
     }
 
-    /// Makes a call; a panic in it goes on as a panic of the side that called.
+    /// Makes a call; a panic in it continues as a panic of the calling side.
     pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
         match self.caught(work) {
             Ok(value) => value,
@@ -40,11 +40,11 @@ impl Border {
         }
     }
 
-    /// Makes a call that may fail; a panic of the plugin is an error.
+    /// Makes a call that may fail; a panic of the plugin becomes an error.
     ///
     /// # Errors
-    /// Those of the call, which name the plugin where the message alone would not tell
-    /// what to look at, and [`Error::Failed`] where the plugin panicked.
+    /// Those of the call, with the plugin's name where the message alone would not identify it, and
+    /// [`Error::Failed`] when the plugin panicked.
     pub fn try_run<R>(self, work: impl FnOnce() -> Result<R>) -> Result<R> {
         match self.caught(work) {
             Ok(Ok(value)) => Ok(value),
@@ -57,18 +57,18 @@ impl Border {
         }
     }
 
-    /// Drops a value on its own side; a panic in that ends there.
+    /// Drops a value on its own side; a panic during that is discarded.
     pub fn drop<T>(self, value: T) {
         let _ = self.caught(|| drop(value));
     }
 
-    /// An error of a plugin that returned what it must not.
+    /// An error for a plugin that returned something invalid.
     fn fault(self, what: &str) -> Error {
         let (Self::Inward(plugin) | Self::Outward(plugin)) = self;
         Error::Failed(format!("{BLAMES_PLUGIN}{}: {what}", plugin.path.display()))
     }
 
-    /// Refuses values of a plugin that are not finite, where those it was given are.
+    /// Refuses non-finite values of a plugin whose inputs were finite.
     ///
     /// # Errors
     /// [`Error::Failed`] naming the plugin, and `what` the first such value is.
@@ -82,7 +82,7 @@ impl Border {
         }
     }
 
-    /// Refuses what a plugin returned, where it was looked at and found wrong.
+    /// Refuses an invalid result of a plugin.
     ///
     /// # Errors
     /// [`Error::Failed`] naming the plugin, and what is wrong.
@@ -93,7 +93,7 @@ impl Border {
         }
     }
 
-    /// As [`Border::finite`], for calls that return no error.
+    /// As [`Border::finite`], for calls that cannot return an error.
     pub fn check_finite(self, given: &[f64], values: &[f64], what: &str) {
         if let Err(error) = self.finite(given, values, what) {
             panic_any(error.to_string());
@@ -108,7 +108,7 @@ impl Border {
         }
     }
 
-    /// Runs work within the `catch_unwind` of the side that the object belongs to.
+    /// Runs work inside the `catch_unwind` of the side that owns the object.
     fn caught<R>(self, work: impl FnOnce() -> R) -> Result<R, Caught> {
         let (mut work, mut done) = (Some(work), None);
         let mut call = || done = work.take().map(|work| work());
@@ -122,7 +122,7 @@ impl Border {
         })
     }
 
-    /// Panics on the side that called.
+    /// Panics on the calling side.
     fn raise(self, caught: Caught) -> ! {
         match self {
             Self::Inward(_) if caught.passing => resume_unwind(Box::new(caught.text)),
@@ -130,8 +130,8 @@ impl Border {
                 self.fault(&format!("panicked: {}", caught.text))
                     .to_string(),
             ),
-            // SAFETY: the text outlives the call, which copies it. The function unwinds
-            // through this frame into the plugin that called, whose panic it is.
+            // SAFETY: the text outlives the call, which copies it. The function unwinds through
+            // this frame into the calling plugin, whose panic it is.
             Self::Outward(plugin) => unsafe {
                 (plugin.panics.raise)(caught.text.as_ptr(), caught.text.len())
             },

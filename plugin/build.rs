@@ -1,11 +1,11 @@
-//! Tells the crate what it is built by and from: a plugin that is loaded at run time must
-//! have the same compiler and the same sources of the crates whose types cross.
+//! Tells the crate which compiler and sources it is built from. A plugin that is loaded at run time
+//! must have the same compiler and the same sources of the crates whose types cross the border.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, io};
 
-/// Folders of the crates whose types cross, this one's included.
+/// Folders of the crates whose types cross the border, including this one.
 const CROSSING: [&str; 4] = [".", "../asid-core", "../effects", "../mjcf"];
 
 fn main() -> io::Result<()> {
@@ -47,7 +47,7 @@ fn sources(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
     Ok(())
 }
 
-/// The hash of Fowler, Noll and Vo, 64 bit, 1a.
+/// The 64-bit hash FNV-1a of Fowler, Noll and Vo.
 struct Fnv(u64);
 
 impl Default for Fnv {

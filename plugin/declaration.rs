@@ -1,4 +1,4 @@
-//! What a plugin exports: one constant, which says what it is before anything of it is used.
+//! What a plugin exports: one constant, which describes it before anything of it is used.
 
 use std::ffi::{CStr, c_char};
 use std::mem::offset_of;
@@ -12,13 +12,13 @@ use asid_core::error::{Error, Result};
 /// Name of the exported constant.
 pub const SYMBOL: &str = "asid_rust_plugin";
 
-/// How the constant begins.
+/// First bytes of the constant.
 const MAGIC: [u8; 8] = *b"ASIDRUST";
 
-/// What a shared library of Rust is built by and from, and what it hands over.
+/// The compiler and sources of a shared library in Rust, and what it provides.
 ///
-/// The first four fields have the same place in every version, and are all that is read
-/// before the fingerprints were compared.
+/// The first four fields have the same offsets in every version. Only these are read before the
+/// fingerprints are compared.
 #[repr(C)]
 pub struct Declaration {
     magic: [u8; 8],
@@ -34,7 +34,7 @@ pub struct Declaration {
 // SAFETY: the pointers are to constants of the library, which is never closed.
 unsafe impl Sync for Declaration {}
 
-/// The constant. It is in every shared library that holds this crate, once, however many
+/// The constant. Every shared library that contains this crate has it exactly once, however many
 /// packages with parts are linked into it.
 #[unsafe(no_mangle)]
 #[allow(non_upper_case_globals)]
@@ -50,16 +50,18 @@ pub static asid_rust_plugin: Declaration = Declaration {
 };
 
 impl Declaration {
-    /// Reads the constant of a library, after checking that it can be read; `None` where
-    /// no package in the library hands anything over, as in an engine that is written in Rust.
+    /// Reads the constant of a library, after checking that it can be read.
+    ///
+    /// `None` if no package in the library provides anything, as in an engine that is written in
+    /// Rust.
     ///
     /// # Errors
     /// [`Error::Plugin`] saying what differs from this program, and what to do.
     ///
     /// # Safety
-    /// `address` is that of the constant [`SYMBOL`] of a library that stays open: at least
-    /// four words, of which the second tells how many bytes there are, the third is null
-    /// or points to a text ended by a zero, and the fourth is a function.
+    /// `address` is that of the constant [`SYMBOL`] of a library that stays open. It has at least
+    /// four words: the second is its number of bytes, the third is null or points to a
+    /// zero-terminated text, and the fourth is a function.
     pub(super) unsafe fn read(address: *const Self, path: &Path) -> Result<Option<&'static Self>> {
         let refuse = |message: String| Error::Plugin {
             path: path.to_owned(),
@@ -68,7 +70,7 @@ impl Declaration {
         if address.is_null() || !address.is_aligned() {
             return Err(refuse(format!("its `{SYMBOL}` is at no valid address")));
         }
-        // SAFETY: these words are there; `addr_of!` makes no reference to the rest.
+        // SAFETY: these words exist; `addr_of!` makes no reference to the rest.
         let (magic, size, text) = unsafe {
             (
                 (&raw const (*address).magic).read(),
@@ -85,12 +87,12 @@ impl Declaration {
                 "its `{SYMBOL}` is cut off: {size} bytes where {needed} are needed; rebuild the plugin"
             )));
         }
-        // SAFETY: it is there, and a function of the C ABI in every version.
+        // SAFETY: it exists, and is a function of the C ABI in every version.
         let exported = unsafe { (&raw const (*address).exported).read() };
         if exported() == 0 {
             return Ok(None);
         }
-        // SAFETY: it is a text ended by a zero.
+        // SAFETY: it is a zero-terminated text.
         let theirs = unsafe { CStr::from_ptr(text) }.to_string_lossy();
         if let Some(difference) = fingerprint::difference(&theirs) {
             return Err(refuse(difference));
@@ -100,7 +102,7 @@ impl Declaration {
                 "its `{SYMBOL}` is cut off: {size} bytes where {needed} are needed; rebuild the plugin"
             )));
         }
-        // SAFETY: all of it is there, and the same compiler made it from the same sources.
+        // SAFETY: all of it exists, and the same compiler made it from the same sources.
         let (probes, count) = unsafe { ((*address).probes, (*address).probe_count) };
         // SAFETY: as above; these are the parts of a constant slice.
         let probes = unsafe { std::slice::from_raw_parts(probes, count) };
@@ -116,17 +118,17 @@ impl Declaration {
         self.panics
     }
 
-    /// What it registers, its panics being caught by the caller.
+    /// What it registers; the caller catches its panics.
     pub(super) fn entries(&self) -> Entries {
         (self.entries)()
     }
 }
 
-/// Hands over what the package registers, where it is in a shared library that
-/// `asid --plugin FILE` loads.
+/// Provides what the package registers, if it is in a shared library that `asid --plugin FILE`
+/// loads.
 ///
-/// It is written once in a crate. The library is one of the type `cdylib`: of the crate
-/// itself, or of another that links it. In a program it does nothing.
+/// It is written once in a crate. The library is of type `cdylib`, made from the crate itself or
+/// from another that links it. In a program it does nothing.
 #[macro_export]
 macro_rules! export_plugin {
     () => {

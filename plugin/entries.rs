@@ -1,4 +1,4 @@
-//! What a plugin hands over, and its registration in this program.
+//! What a plugin provides, and its registration in this program.
 
 use std::path::Path;
 
@@ -17,24 +17,24 @@ use asid_core::solve::TaskSolver;
 use asid_core::task::Task;
 use asid_effects::EffectEntry;
 
-/// What a plugin brought.
+/// What a plugin registered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Registered {
     /// Its packages.
     pub packages: Vec<Package>,
-    /// Kind, own name, and the name that it got here.
+    /// Kind, own name, and registered name of each entry.
     pub entries: Vec<(&'static str, &'static str, &'static str)>,
 }
 
-/// Checks a plugin and registers what it hands over; `None` where that is nothing.
+/// Checks a plugin and registers what it provides; `None` if that is nothing.
 ///
 /// # Errors
-/// [`Error::Plugin`] where it was not built as this program was, hands over nothing, or
-/// has a name that cannot be used; [`Error::Failed`] where it panics.
+/// [`Error::Plugin`] when it was not built like this program, provides nothing, or has an invalid
+/// name; [`Error::Failed`] when it panics.
 ///
 /// # Safety
-/// `address` is that of the constant [`SYMBOL`](super::SYMBOL) of the library `path`,
-/// which is never closed.
+/// `address` is that of the constant [`SYMBOL`](super::SYMBOL) of the library `path`, which is
+/// never closed.
 pub unsafe fn accept(
     address: *const Declaration,
     path: &'static Path,
@@ -78,7 +78,7 @@ struct Adder {
     origin: Origin,
 }
 
-/// Kind, own name, and the name that an entry got.
+/// Kind, own name, and registered name of an entry.
 type Added = (&'static str, &'static str, &'static str);
 
 impl Adder {

@@ -1,4 +1,4 @@
-//! What the packages of a shared library hand over.
+//! What the packages of a shared library provide.
 
 use asid_core::error::Result;
 use asid_core::registry::{
@@ -19,8 +19,7 @@ pub struct Entries {
 }
 
 impl Entries {
-    /// What the packages that are exported register, in the copy of the crate that this
-    /// code is in.
+    /// What the exported packages register, in this code's copy of the crate.
     pub fn exported() -> Self {
         fn of<E: Entry>(packages: &[Package]) -> Vec<&'static E> {
             let ours = |e: &&E| matches!(e.origin(), Origin::Linked(p) if packages.contains(&p));
@@ -40,7 +39,7 @@ impl Entries {
         }
     }
 
-    /// Whether all names can be used, before the first one is.
+    /// Checks all names before the first one is used.
     pub fn check_names(&self) -> Result<()> {
         fn check<E: Entry>(entries: &[&'static E]) -> Result<()> {
             let mut names = entries.iter().map(|e| e.name());
@@ -55,13 +54,13 @@ impl Entries {
     }
 }
 
-/// A package that hands its parts over where it is in a shared library.
+/// A package that provides its parts when it is in a shared library.
 #[doc(hidden)]
 pub struct Exported(pub Package);
 
 inventory::collect!(Exported);
 
-/// Number of packages that hand over parts.
+/// Number of packages that provide parts.
 pub extern "C" fn exported() -> usize {
     inventory::iter::<Exported>().count()
 }

@@ -1,12 +1,10 @@
-//! What a plugin and this program must have in common, and what to do where they differ.
+//! What a plugin and this program must have in common, and what to do if they differ.
 //!
-//! Layouts of Rust types are the compiler's affair: only the same compiler gives the same
-//! ones. The sources of ASID's crates fix their own types, and the sizes of all that cross
-//! tell whether a dependency was built with other features, as with the order-preserving
-//! maps of serde_json.
+//! The layout of Rust types is up to the compiler, so only the same compiler gives the same layout.
+//! The sources of ASID's crates fix their own types. The sizes of all types that cross reveal a
+//! dependency that was built with other features, such as serde_json's order-preserving maps.
 
-/// Compiler, target and sources of this copy, one
-/// `name=value` a line, ended by a zero.
+/// Compiler, target and sources of this copy, one `name=value` a line, zero-terminated.
 pub const TEXT: &str = concat!(
     "compiler=",
     env!("ASID_COMPILER"),
@@ -83,7 +81,7 @@ probes!(
     asid_core::registry::ExplorerEntry,
 );
 
-/// Says what differs and what to do, where something does: `theirs` is the plugin's text.
+/// What differs from the plugin's text `theirs` and what to do; `None` where nothing differs.
 pub fn difference(theirs: &str) -> Option<String> {
     let ours = TEXT.trim_end_matches('\0');
     if theirs == ours {
@@ -116,7 +114,7 @@ pub fn difference(theirs: &str) -> Option<String> {
     ))
 }
 
-/// Says which type has another size in the plugin, where one does.
+/// The type that has another size in the plugin, as a message; `None` where none has.
 pub fn other_layout(theirs: &[Probe]) -> Option<String> {
     if theirs.len() != PROBES.len() {
         return Some(format!(

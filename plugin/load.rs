@@ -1,4 +1,4 @@
-//! Loads plugins and registers what they bring.
+//! Loads plugins and registers their parts.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -9,32 +9,32 @@ use asid_abi::library::{self, Library};
 use asid_core::registry::{self, BackendEntry, Entry as _, Origin, Package};
 use asid_core::{Error, Result};
 
-/// A plugin that was loaded.
+/// A loaded plugin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loaded {
-    /// Its file, without links in its path.
+    /// Its file, with links resolved.
     pub file: &'static Path,
-    /// Its Cargo packages, where it brings parts in Rust.
+    /// Its Cargo packages, if it has parts in Rust.
     pub packages: Vec<Package>,
-    /// What it brought.
+    /// Its parts.
     pub parts: Vec<Part>,
 }
 
-/// One part that a plugin brought.
+/// One part of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// What kind of part it is, such as `task`.
+    /// The kind of part, such as `task`.
     pub kind: &'static str,
     /// Its own name.
     pub own_name: &'static str,
-    /// The name that it is registered by: another one where its own was taken.
+    /// Its registered name, which differs from its own name if that was taken.
     pub name: &'static str,
 }
 
-/// Plugins that are loaded, in order.
+/// Loaded plugins, in order.
 static LOADED: Mutex<Vec<Loaded>> = Mutex::new(Vec::new());
 
-/// Plugins that are loaded, in the order of loading.
+/// Loaded plugins, in the order of loading.
 #[must_use]
 pub fn loaded() -> Vec<Loaded> {
     LOADED
@@ -43,7 +43,7 @@ pub fn loaded() -> Vec<Loaded> {
         .clone()
 }
 
-/// Loads a plugin and registers what it brings; one that is loaded already stays as it is.
+/// Loads a plugin and registers its parts; a plugin that is already loaded stays unchanged.
 ///
 /// # Errors
 /// [`Error::Plugin`] naming the file, what is wrong with it, and what to do.
@@ -115,9 +115,9 @@ fn register(path: &Path, file: PathBuf) -> Result<Loaded> {
     Ok(loaded)
 }
 
-/// Address of the constant of parts in Rust, where a library has it.
+/// Address of the constant of parts in Rust, if a library has it.
 fn declaration(library: &'static Library) -> Option<*const Declaration> {
-    // SAFETY: the symbol is only taken for an address, whatever it is the address of.
+    // SAFETY: the symbol is only used as an address, whatever it refers to.
     let symbol = unsafe { library.get::<*const Declaration>(SYMBOL) }.ok()?;
     // SAFETY: the library is never closed, so the address stays valid.
     let address = unsafe { symbol.try_as_raw_ptr() }?;

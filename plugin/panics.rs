@@ -1,4 +1,4 @@
-//! Panics of one copy of the standard library, and how they pass to another.
+//! Panics of one copy of the standard library, and how they pass to another copy.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -6,25 +6,25 @@ use std::sync::{Mutex, PoisonError};
 
 /// A panic that was caught.
 pub struct Caught {
-    /// What it said, and where it happened if that is known.
+    /// Its message, and its place if known.
     pub text: String,
-    /// It began on the other side and only passed through this one.
+    /// Whether it began on the other side and only passed through this one.
     pub passing: bool,
 }
 
-/// What a side needs of the other one's copy of the standard library.
+/// What a side needs of the other side's copy of the standard library.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct Panics {
     /// Runs work and catches panics of that copy.
     pub catch: fn(&mut dyn FnMut()) -> Result<(), Caught>,
-    /// Panics in that copy with a text of so many bytes, as a panic that passes through.
+    /// Panics in that copy with a text of this many bytes, as a panic that passes through.
     pub raise: unsafe extern "C-unwind" fn(*const u8, usize) -> !,
     /// Silences that copy's panics; their text is kept for [`Caught`].
     pub silence: fn(),
 }
 
-/// Those of the copy that this code is compiled with.
+/// The functions of the copy that this code is compiled with.
 pub const OWN: Panics = Panics {
     catch,
     raise,
@@ -34,7 +34,7 @@ pub const OWN: Panics = Panics {
 /// Payload of a panic that began on the other side.
 struct Passing(String);
 
-/// What the latest panic said and where, while panics are silenced.
+/// Message and place of the latest panic, while panics are silenced.
 static LATEST: Mutex<Option<String>> = Mutex::new(None);
 
 /// Runs work and catches panics of this copy.
@@ -51,7 +51,7 @@ pub fn catch(work: &mut dyn FnMut()) -> Result<(), Caught> {
     })
 }
 
-/// The text of a payload, with its place where the hook saw one.
+/// The text of a payload, with its place if the hook recorded one.
 fn text(payload: Box<dyn Any + Send>) -> String {
     let said = match payload.downcast::<String>() {
         Ok(text) => *text,
@@ -69,9 +69,9 @@ fn text(payload: Box<dyn Any + Send>) -> String {
     seen.unwrap_or(said)
 }
 
-/// Panics in this copy; `text` and `len` are those of a text in UTF-8.
+/// Panics in this copy; `text` and `len` describe a UTF-8 text.
 unsafe extern "C-unwind" fn raise(text: *const u8, len: usize) -> ! {
-    // SAFETY: the caller hands over the parts of a slice that outlives the call.
+    // SAFETY: the caller passes the parts of a slice that outlives the call.
     let text = String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(text, len) });
     resume_unwind(Box::new(Passing(text.into_owned())))
 }

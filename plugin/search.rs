@@ -1,5 +1,5 @@
-//! Where plugins are looked for: files that are named, the folders of
-//! `ASID_PLUGIN_PATH`, the user's data folder, in this order.
+//! Where plugins are searched: named files, the folders of `ASID_PLUGIN_PATH`, the user's data
+//! folder, in this order.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ use asid_core::{Error, Result};
 /// Folders and files, separated as in `PATH`.
 pub const VARIABLE: &str = "ASID_PLUGIN_PATH";
 
-/// A place that is looked in without being named in the call.
+/// A place that is searched without being named in the call.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// A folder, or a file of [`VARIABLE`].
     pub path: PathBuf,
-    /// What names it.
+    /// The setting that names it.
     pub from: &'static str,
 }
 
@@ -47,7 +47,7 @@ fn data_folder() -> Option<PathBuf> {
 /// Files of a place that could be plugins, sorted by name. The data folder may be absent.
 ///
 /// # Errors
-/// [`Error::File`] where a place that was named is not there or cannot be read.
+/// [`Error::File`] when a named place does not exist or cannot be read.
 pub fn files(place: &Place) -> Result<Vec<PathBuf>> {
     let path = &place.path;
     if path.is_file() {
@@ -75,7 +75,7 @@ pub fn files(place: &Place) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// True for a file that is named as this platform names shared libraries.
+/// Whether a file has this platform's name of a shared library.
 fn is_library(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.ends_with(env::consts::DLL_SUFFIX) && path.is_file()

@@ -24,7 +24,7 @@ use asid_core::progress::Progress;
 use asid_core::target::Target;
 use asid_core::task::Task;
 
-/// What a problem refers to, wrapped for the side that is handed it.
+/// The objects that a problem refers to, wrapped for the other side.
 struct Handed<'a> {
     task: Across<&'a dyn Task>,
     model: Across<&'a dyn Model>,
@@ -55,8 +55,9 @@ impl<'a> Handed<'a> {
         }
     }
 
-    /// The problem for an object that keeps it. The few words that it takes are never
-    /// freed: they must outlive what the other side makes of them.
+    /// The problem for an object that keeps it.
+    ///
+    /// Its small memory is never freed, because it must outlive what the other side makes of it.
     fn kept(problem: &'a Problem<'a>, border: Border) -> &'a Problem<'a> {
         let handed: &'a Self = Box::leak(Box::new(Self::new(problem, border)));
         Box::leak(Box::new(handed.problem(problem)))

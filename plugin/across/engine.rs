@@ -1,4 +1,4 @@
-//! Engines: models, simulators, and the hooks that are handed to them.
+//! Engines: models, simulators, and the hooks passed to them.
 
 use std::ops::Deref;
 use std::sync::Arc;

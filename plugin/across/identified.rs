@@ -1,14 +1,15 @@
-//! What an identifier of a plugin hands back, looked at before anything is computed with it.
+//! Checks the result of a plugin's identifier before anything is computed with it.
 
 use asid_core::episode::Episode;
 use asid_core::identify::Identified;
 use asid_core::posterior::Posterior;
 use asid_core::problem::Problem;
 
-/// How far the weights of a posterior may sum from 1: they are sums of some thousand rounded numbers, and of single precision at worst.
+/// Largest difference from 1 of the sum of a posterior's weights. It is the rounding of some
+/// thousand numbers, in single precision at worst.
 const ROUNDING: f64 = 1e-4;
 
-/// Whether what was found has the shapes and values that [`Identified`] states.
+/// Checks that a result has the shapes and values that [`Identified`] states.
 ///
 /// # Errors
 /// When it has not; the text says what is wrong, with both numbers.
@@ -45,7 +46,7 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Whether a posterior is one over the unknowns of a problem.
+/// Checks that a posterior is one over the unknowns of a problem.
 fn posterior(posterior: &Posterior, problem: &Problem<'_>) -> Result<(), String> {
     let unknowns = problem.parameters.len();
     let marginals = &posterior.marginals;
@@ -91,7 +92,7 @@ fn posterior(posterior: &Posterior, problem: &Problem<'_>) -> Result<(), String>
     Ok(())
 }
 
-/// Refuses a number of things that is not that of others.
+/// Refuses a count that differs from the wanted one.
 fn counted(what: &str, own: usize, of: &str, wanted: usize) -> Result<(), String> {
     if own == wanted {
         return Ok(());

@@ -31,7 +31,7 @@ where
     }
 
     fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
-        // A plugin need not check what it is given.
+        // Check the values here, because a plugin need not check them.
         Levels::new(self.difficulty()).with(values)?;
         let task = self.try_run(|task| task.adjusted(values))?;
         Ok(task.map(|inner| self.another(inner)))
