@@ -1,7 +1,8 @@
 //! Where bodies touch, from their shapes and poses alone.
 //!
-//! Engines say how hard two bodies press, not where, and a log says neither. So the points are those at which shapes
-//! that may touch are within [`NEAR`] of each other, by `parry3d`. A mesh counts as its convex hull, as in MuJoCo.
+//! Engines report how hard two bodies press, not where, and a log reports neither. The contact
+//! points are therefore those at which shapes that may touch are within [`NEAR`] of each other,
+//! computed by `parry3d`. A mesh counts as its convex hull, as in MuJoCo.
 
 use asid_mjcf::Plant;
 use mjcf_rs::body::GeomType;
@@ -12,14 +13,14 @@ use parry3d::shape::{Capsule, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, Sha
 
 use crate::surface::Surface;
 
-/// Distance up to which shapes count as touching, m: what an engine leaves between bodies at rest, and what sensors
-/// of real machines resolve.
+/// Distance up to which shapes count as touching, m: the gap that an engine leaves between bodies
+/// at rest, and the resolution of real machines' sensors.
 pub const NEAR: f32 = 1e-3;
-/// Pairs beyond which a scene's contacts are not looked for: a picture of them would be none.
+/// Largest number of pairs for which contacts are computed; a picture of more would be unreadable.
 const MOST_PAIRS: usize = 4000;
-/// Points a frame at most.
+/// Largest number of points in a frame.
 const MOST_POINTS: usize = 64;
-/// Points on an ellipsoid whose hull stands for it, along each angle.
+/// Points along each angle of an ellipsoid, whose convex hull replaces it.
 const FACETS: usize = 12;
 
 /// A geom that may touch another.
@@ -27,14 +28,14 @@ struct Solid {
     part: usize,
     part_from_geom: Pose,
     shape: SharedShape,
-    /// Radius of a ball around the origin of the geom that holds it, m; infinite for a plane.
+    /// Radius of a ball around the geom's origin that contains it, m; infinite for a plane.
     radius: f32,
 }
 
-/// Of a geom its frame in its part, kind, size, and mesh.
+/// A geom's frame in its part, kind, size, and mesh.
 pub(crate) type Framed = (Isometry3<f64>, GeomType, [f64; 3], Option<usize>);
 
-/// Geometry of what may touch.
+/// Geometry of the shapes that may touch.
 #[derive(Default)]
 pub(crate) struct Touch {
     solids: Vec<Option<Solid>>,
@@ -42,7 +43,7 @@ pub(crate) struct Touch {
 }
 
 impl Touch {
-    /// `frames` are of all geoms, in the plant's order.
+    /// Prepares the geoms of a plant; `frames` are those of all geoms, in the plant's order.
     pub(crate) fn new(
         plant: &Plant,
         part_of: &[usize],
@@ -76,7 +77,7 @@ impl Touch {
         }
     }
 
-    /// Points where something touches, `parts` being the poses of all parts but the world.
+    /// Points of contact; `parts` are the poses of all parts but the world.
     pub(crate) fn points(&self, parts: &[Isometry3<f64>]) -> Vec<[f64; 3]> {
         let mut found = Vec::new();
         let there = |p: &Isometry3<f64>| {
@@ -140,7 +141,7 @@ fn pose(p: &Isometry3<f64>) -> Pose {
     )
 }
 
-/// The shape, and how it is turned from the geom's frame.
+/// The shape, and its rotation relative to the geom's frame.
 fn shape(
     kind: GeomType,
     [a, b, c]: [f32; 3],
@@ -152,7 +153,7 @@ fn shape(
         GeomType::Sphere => (SharedShape::ball(a), none),
         GeomType::Box => (SharedShape::new(Cuboid::new(Vector::new(a, b, c))), none),
         GeomType::Capsule => (SharedShape::new(Capsule::new_z(b, a)), none),
-        // A cylinder's axis is y there and z here.
+        // A cylinder's axis is y in parry and z here.
         GeomType::Cylinder => (
             SharedShape::new(Cylinder::new(b, a)),
             Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2)),

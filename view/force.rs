@@ -1,4 +1,5 @@
-//! Forces that the model lacks, as arrows: where they act, along what, and how large they are frame by frame.
+//! Missing forces of the model as arrows: where they act, in which direction, and how large they
+//! are in each frame.
 
 use asid_core::layout::JointKind;
 use asid_results::trace::ForceTrace;
@@ -6,7 +7,8 @@ use asid_results::view::Force;
 
 use crate::Stage;
 
-/// The force that is missing along an episode, at some frames of it; `None` where the scene has no such degree of freedom.
+/// The missing force along an episode, at some of its frames; `None` where the scene has no such
+/// degree of freedom.
 #[must_use]
 pub fn at(missing: &ForceTrace, stage: &Stage<'_>, frames: &[f64]) -> Option<Force> {
     let plant = stage.plant;
@@ -15,7 +17,7 @@ pub fn at(missing: &ForceTrace, stage: &Stage<'_>, frames: &[f64]) -> Option<For
         let axis = missing.dof.strip_prefix(&joints[j].name)?;
         (axis.is_empty() || axis.starts_with('.')).then_some((j, axis))
     };
-    // The longest name wins: one joint's may begin with another's.
+    // The longest name wins, because one joint's name may be a prefix of another's.
     let (joint, axis) = (0..joints.len())
         .filter_map(named)
         .max_by_key(|(j, _)| joints[*j].name.len())?;
@@ -53,7 +55,7 @@ pub fn at(missing: &ForceTrace, stage: &Stage<'_>, frames: &[f64]) -> Option<For
     })
 }
 
-/// A series at other times; 0 outside of it and where it is not known. Nothing where there is no series.
+/// A series at other times; 0 outside it and where it is unknown. Empty if there is no series.
 fn along(time: &[f64], values: &[f64], frames: &[f64]) -> Vec<f32> {
     let n = time.len().min(values.len());
     if n == 0 {

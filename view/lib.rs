@@ -1,12 +1,14 @@
-//! Makes the 3-D view of a report: shapes of a scene, and the motions of its machines as poses over time.
+//! Makes the 3-D view of a report: shapes of a scene, and the motions of its machines as poses over
+//! time.
 //!
-//! Everything here is read from the scene's document, and from positions (`qpos`) that any engine records or a log
-//! holds. No engine takes part, so that a picture is the same whatever simulated it.
+//! Everything here is read from the scene's document and from positions (`qpos`) that an engine
+//! recorded or a log holds. No engine takes part, so that a picture is the same whatever simulated
+//! it.
 //!
-//! A [`Stage`] is the scene: its geoms, moved into the frames of the parts that move as one, and its meshes with
-//! few enough triangles ([`mesh`]). [`Stage::take`] adds an episode: a [`Motion`] for each machine that is to be seen,
-//! thinned to [`motion::RATE`] frames a second, with the points where bodies touch ([`contact`]) and the forces that the
-//! model lacks ([`force`]). What a log says of `qpos` is read by [`logged::positions`].
+//! A [`Stage`] is the scene: its geoms in the frames of rigid parts, and its meshes with few enough
+//! triangles ([`mesh`]). [`Stage::take`] adds an episode: a [`Motion`] for each visible machine,
+//! thinned to [`motion::RATE`] frames a second, with the points where bodies touch ([`contact`])
+//! and the forces that the model lacks ([`force`]). [`logged::positions`] reads `qpos` from a log.
 //!
 //! The types are those of [`asid_results::view`]; `asid-report` shows them.
 

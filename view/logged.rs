@@ -1,13 +1,15 @@
-//! What a log says of the positions of a machine.
+//! The positions of a machine in a log.
 
 use asid_core::Episode;
 use asid_core::layout::JointKind;
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 
-/// Positions `qpos` at the rows of a log, `rows x nq`, and the joints that no sensor reads. These have the values of
-/// `otherwise` (`rows x nq`), which a simulation of the same commands gave. Between two readings of a slow sensor
-/// positions are interpolated. `None` where no sensor reads any position.
+/// Positions `qpos` at the rows of a log, `rows x nq`, and the joints without a sensor.
+///
+/// The latter take the values of `otherwise` (`rows x nq`), which a simulation of the same commands
+/// gave. Between two readings of a slow sensor positions are interpolated. `None` where no sensor
+/// reads any position.
 #[must_use]
 pub fn positions(
     plant: &Plant,
@@ -61,10 +63,10 @@ pub fn positions(
     read.contains(&true).then_some((qpos, unread))
 }
 
-/// A remark on joints that no sensor reads; `None` where there are none.
+/// A remark on joints without a sensor; `None` if there are none.
 #[must_use]
 pub fn remark(unread: &[String]) -> Option<String> {
-    // More names than this are not read by anyone.
+    // Nobody reads more names than this.
     const NAMED: usize = 8;
     let (named, more) = unread.split_at(unread.len().min(NAMED));
     let more = match more.len() {
@@ -79,7 +81,8 @@ pub fn remark(unread: &[String]) -> Option<String> {
     })
 }
 
-/// Readings with what is missing interpolated, and held before the first and after the last; `None` where there are none.
+/// Readings with missing values interpolated, and held before the first and after the last; `None`
+/// if there are none.
 fn filled(time: &[f64], readings: &[f64]) -> Option<Vec<f64>> {
     let there: Vec<usize> = (0..readings.len())
         .filter(|&k| readings[k].is_finite())

@@ -1,7 +1,9 @@
-//! Meshes of a scene: read from their files as an engine does, with few enough triangles for a page.
+//! Meshes of a scene, read from their files as an engine reads them, with few enough triangles for
+//! a page.
 //!
-//! STL (binary and text) and OBJ are read, which is what MJCF models come with; of other files a remark is left. A
-//! file's own counts are not trusted: nothing is reserved beyond what its bytes hold.
+//! STL (binary and text) and OBJ are read, the usual formats of MJCF models; other files lead to a
+//! remark. The counts in a file are not trusted: no memory is reserved beyond the size of its
+//! content.
 
 use std::path::{Path, PathBuf};
 
@@ -15,15 +17,15 @@ use crate::surface::Surface;
 
 /// Triangles of all meshes of a scene together: about 300 kB of a report.
 pub const TRIANGLES: usize = 24_000;
-/// Fewest that a mesh is left, however many others there are.
+/// Fewest triangles of a mesh, however many other meshes there are.
 const FEWEST: usize = 120;
-/// Vertices of a mesh at most: indices have 16 bits.
+/// Largest number of vertices of a mesh: indices have 16 bits.
 const VERTICES: usize = 65_535;
-/// Largest file that is read, bytes: far above any robot's, and read in a second.
+/// Largest file that is read, bytes. It is far larger than any robot's, and read in a second.
 const LARGEST: u64 = 256 << 20;
 
-/// The meshes of these names, in the frames of their geoms, with at most [`TRIANGLES`] in all; `Err` says in words
-/// why one is not there.
+/// The meshes of these names, in the frames of their geoms, with at most [`TRIANGLES`] in total;
+/// `Err` holds the reason why one is missing.
 pub(crate) fn of_scene(
     scene: &Scene,
     model: &Model,
@@ -66,7 +68,7 @@ fn name_of(mesh: &Mesh) -> String {
     mesh.name.clone().or_else(of_file).unwrap_or_default()
 }
 
-/// A mesh in the frame of its geoms: moved by its reference pose, then scaled, as MuJoCo does.
+/// A mesh in the frame of its geoms: as in MuJoCo, moved by its reference pose, then scaled.
 fn surface(scene: &Scene, model: &Model, mesh: &Mesh) -> Result<Surface, String> {
     let mut surface = match (&mesh.inline_vertices, &mesh.file) {
         (Some(flat), _) => inline(flat, mesh.inline_faces.as_deref())?,
@@ -88,7 +90,7 @@ fn surface(scene: &Scene, model: &Model, mesh: &Mesh) -> Result<Surface, String>
     Ok(surface)
 }
 
-/// Where a mesh's file lies.
+/// Path of a mesh's file.
 fn place(scene: &Scene, model: &Model, file: &str) -> PathBuf {
     let home = scene.directory().unwrap_or(Path::new(""));
     let compiler = &model.compiler;
@@ -122,7 +124,7 @@ fn inline(flat: &[f64], faces: Option<&[u32]>) -> Result<Surface, String> {
     })
 }
 
-/// A surface whose triangles have their vertices.
+/// Checks that the vertices of all triangles exist.
 fn checked(surface: Surface) -> Result<Surface, String> {
     let n = surface.vertices.len();
     if surface.triangles.is_empty() {
@@ -139,7 +141,7 @@ fn checked(surface: Surface) -> Result<Surface, String> {
     }
 }
 
-/// Reads a file by its ending.
+/// Reads a file according to its extension.
 fn read(path: &Path) -> Result<Surface, String> {
     let said = |why: &dyn std::fmt::Display| format!("{}: {why}", path.display());
     let size = std::fs::metadata(path).map_err(|e| said(&e))?.len();
@@ -160,7 +162,8 @@ fn read(path: &Path) -> Result<Surface, String> {
     checked(surface).map_err(|e| said(&e))
 }
 
-/// STL, binary where its length fits its count, text otherwise. Equal vertices become one.
+/// Reads STL: binary if the file's length matches its count, text otherwise. Equal vertices are
+/// merged.
 fn stl(bytes: &[u8]) -> Surface {
     let count = bytes
         .get(80..84)
@@ -206,7 +209,7 @@ fn three(text: &str) -> Option<[f64; 3]> {
     Some([numbers.next()??, numbers.next()??, numbers.next()??])
 }
 
-/// OBJ: vertices and faces; a face of more corners is a fan.
+/// Reads OBJ: vertices and faces; a face with more than three corners becomes a fan.
 fn obj(text: &str) -> Surface {
     let mut surface = Surface::default();
     for line in text.lines() {
@@ -217,7 +220,7 @@ fn obj(text: &str) -> Surface {
             let n = surface.vertices.len() as i64;
             let corner = |word: &str| -> Option<u32> {
                 let i: i64 = word.split('/').next()?.parse().ok()?;
-                // Counted from one, or backwards from the last.
+                // Indices count from one, or backwards from the last.
                 u32::try_from(if i < 0 { n + i } else { i - 1 }).ok()
             };
             let corners: Vec<u32> = rest.split_whitespace().filter_map(corner).collect();
@@ -261,7 +264,7 @@ mod tests {
         assert_eq!(stl(&binary).vertices.len(), 3);
     }
 
-    /// The count of a damaged file says four thousand million triangles.
+    /// The count in a damaged file claims four thousand million triangles.
     #[test]
     fn damaged_files_are_told_and_reserve_nothing() {
         let mut binary = vec![0; 80];

@@ -1,4 +1,4 @@
-//! Motions of a scene's machines as frames of an episode.
+//! Motions of a scene's machines, as frames of an episode.
 
 use asid_results::trace::ForceTrace;
 use asid_results::view::{Machine, Origin, Take};
@@ -8,16 +8,18 @@ use crate::Stage;
 use crate::force;
 use crate::pack::{Cube, text};
 
-/// Most frames a second. A viewer that draws 60 a second interpolates one more between any two, which looks smooth.
+/// Highest frame rate, 1/s. A viewer that draws 60 a second interpolates one frame between any two,
+/// which looks smooth.
 pub const RATE: f64 = 30.0;
-/// Frames of an episode at most: 20 s at [`RATE`].
+/// Largest number of frames of an episode: 20 s at [`RATE`].
 pub const FRAMES: usize = 600;
 /// Fewest frames of an episode, whatever the budget.
 const FEWEST: usize = 40;
 /// Poses of all episodes and machines together: 14 bytes each, in base64 about 1 MB of a report.
 pub const POSES: usize = 55_000;
 
-/// How far beyond the first machine's motion, in its size or that of the largest shape, others are followed.
+/// How far other machines are followed beyond the first machine's motion, in units of its size or
+/// that of the largest shape.
 const ASTRAY: f64 = 5.0;
 
 /// A machine's motion through an episode.
@@ -27,7 +29,7 @@ pub struct Motion {
     pub origin: Origin,
     /// Name, such as `refined model`.
     pub label: String,
-    /// Positions at the rows of the episode, `rows x nq`; what is not finite is missing.
+    /// Positions at the rows of the episode, `rows x nq`; non-finite values are missing.
     pub qpos: Vec<f64>,
 }
 
@@ -42,12 +44,12 @@ impl Motion {
     }
 }
 
-/// An episode that is to be seen.
+/// An episode to show.
 #[derive(Clone, Copy, Debug)]
 pub struct Played<'a> {
-    /// Episode, as plots name it.
+    /// Name of the episode, as in plots.
     pub name: &'a str,
-    /// What it is, in a few words.
+    /// A short description.
     pub what: &'a str,
     /// Times of its rows, s, increasing.
     pub time: &'a [f64],
@@ -58,7 +60,7 @@ pub struct Played<'a> {
 }
 
 impl Stage<'_> {
-    /// The view of some episodes, those without a row or a machine left out.
+    /// The view with some episodes; those without a row or a machine are left out.
     #[must_use]
     pub fn with(&self, episodes: &[Played<'_>]) -> asid_results::view::View {
         let machines: usize = episodes.iter().map(|e| e.motions.len()).sum();
@@ -72,7 +74,7 @@ impl Stage<'_> {
         view
     }
 
-    /// An episode in at most `most` frames.
+    /// An episode with at most `most` frames.
     #[must_use]
     pub fn take(&self, played: &Played<'_>, most: usize) -> Take {
         let nq = self.plant.layout.nq;
@@ -144,7 +146,8 @@ impl Stage<'_> {
     }
 }
 
-/// Rows that are drawn: about [`RATE`] a second, `most` in all, the first and the last among them.
+/// Rows that are drawn: about [`RATE`] a second and at most `most`, including the first and the
+/// last.
 #[must_use]
 pub fn frames(time: &[f64], most: usize) -> Vec<usize> {
     let (Some(&first), Some(&last)) = (time.first(), time.last()) else {
@@ -154,7 +157,7 @@ pub fn frames(time: &[f64], most: usize) -> Vec<usize> {
     let mut rows = vec![0];
     let mut due = first + step;
     for k in 1..time.len() {
-        // A millionth of a step: times of logs are rounded.
+        // The tolerance of a millionth of a step allows for rounded times in logs.
         if time[k] >= due - 1e-6 * step {
             rows.push(k);
             due = (due + step).max(time[k] + 0.5 * step);

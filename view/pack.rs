@@ -1,14 +1,14 @@
-//! Numbers by the thousand as text: 16-bit integers, little-endian, in base64.
+//! Large arrays of numbers as text: 16-bit integers, little-endian, in base64.
 
 use asid_results::view::Take;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
 
-/// Steps of a position across the box: one below the largest, which says that a pose is missing.
+/// Steps of a position across the box: one less than the largest value, which marks a missing pose.
 const STEPS: f64 = 65534.0;
 /// Steps of a quaternion's component from 0 to 1.
 const TURN: f64 = 32767.0;
-/// What a missing pose begins with.
+/// First number of a missing pose.
 const MISSING: u16 = u16::MAX;
 
 /// The text of some numbers.
@@ -17,7 +17,7 @@ pub fn text(numbers: &[u16]) -> String {
     STANDARD_NO_PAD.encode(bytes)
 }
 
-/// A cube that positions are counted in.
+/// The cube that defines the units of positions.
 #[derive(Clone, Copy, Debug)]
 pub struct Cube {
     /// Lowest corner, m.
@@ -27,7 +27,7 @@ pub struct Cube {
 }
 
 impl Cube {
-    /// The smallest around some points; those that are not finite do not count.
+    /// The smallest cube around some points; non-finite points are ignored.
     pub fn around(points: impl Iterator<Item = [f64; 3]>) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in points.filter(|p| p.iter().all(|x| x.is_finite())) {
@@ -39,7 +39,7 @@ impl Cube {
         if low[0] > high[0] {
             (low, high) = ([0.0; 3], [1.0; 3]);
         }
-        // As it is written: the corner has fewer digits than it was found with, and nothing may fall out.
+        // Use the corner as it is written, with fewer digits, so that no point falls outside.
         let low = low.map(|x| f64::from(x as f32));
         let widest = (0..3).map(|k| high[k] - low[k]).fold(1e-6, f64::max);
         Self {
@@ -53,7 +53,8 @@ impl Cube {
         [self.low, self.low.map(|x| x + self.size)]
     }
 
-    /// No farther than `most` around another one: what a simulation that goes astray reaches is not worth the steps.
+    /// Limits it to a distance of `most` around another cube: what a stray simulation reaches is
+    /// not worth the resolution.
     pub fn near(self, other: Self, most: f64) -> Self {
         let [low, high] = [0, 1].map(|side| {
             [0, 1, 2].map(|k| match side {
@@ -64,7 +65,7 @@ impl Cube {
         Self::around([low, high].into_iter())
     }
 
-    /// A point in steps.
+    /// A point in steps of the cube.
     pub fn point(&self, p: [f64; 3]) -> [u16; 3] {
         [0, 1, 2].map(|k| {
             let steps = (p[k] - self.low[k]) / self.size * STEPS;
@@ -72,7 +73,7 @@ impl Cube {
         })
     }
 
-    /// A pose in steps; missing where it is not finite, or outside.
+    /// A pose in steps; missing if it is not finite or lies outside.
     pub fn pose(&self, pose: &nalgebra::Isometry3<f64>) -> [u16; 7] {
         let (t, q) = (&pose.translation, &pose.rotation);
         let inside = |k: usize| {
@@ -87,7 +88,7 @@ impl Cube {
         [x, y, z, turn(q.w), turn(q.i), turn(q.j), turn(q.k)]
     }
 
-    /// Writes it where the page reads it.
+    /// Writes the cube into the page's data.
     pub fn tell(&self, take: &mut Take) {
         take.low = self.low.map(|x| x as f32);
         take.size = self.size as f32;
@@ -99,7 +100,8 @@ mod tests {
     use super::*;
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
-    /// Half a step each way: 1/65534 of the cube for positions, 1/32767 for a quaternion's component.
+    /// Half a step in each direction: 1/65534 of the cube for positions, 1/32767 for a quaternion's
+    /// component.
     #[test]
     fn a_pose_comes_back_within_half_a_step() {
         let cube = Cube::around([[-1.0, 2.0, 0.0], [3.0, 2.5, 1.0], [f64::NAN; 3]].into_iter());

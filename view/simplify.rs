@@ -1,21 +1,23 @@
-//! Fewer triangles for the same surface.
+//! Reduces the number of triangles of a surface.
 //!
-//! Vertices that share a cell of a grid become one, at their mean; triangles that collapse are dropped. It is the
-//! simplest method there is (Rossignac and Borrel, 1993), it keeps what is large whatever the mesh is like (open, or
-//! with triangles that do not meet), and at the size of a picture in a report finer ones look the same.
+//! Vertices that share a cell of a grid are merged at their mean; triangles that collapse are
+//! dropped. It is the simplest method (Rossignac and Borrel, 1993). It keeps large features of any
+//! mesh (open, or with triangles that do not meet), and at the size of a picture in a report finer
+//! methods look the same.
 
 use std::collections::HashMap;
 
 use crate::surface::Surface;
 
-/// Halvings of the search for the grid: the last changes the cell by 1/1000 of the widest.
+/// Bisection steps of the search for the grid: the last changes the cell by 1/1000 of the widest.
 const HALVINGS: usize = 10;
-/// Cells along the longest side of the finest grid: as many as a picture has pixels across.
+/// Cells along the longest side of the finest grid: as many as the pixels across a picture.
 const FINEST: f64 = 1024.0;
 /// Cells along the longest side of the coarsest grid.
 const COARSEST: f64 = 6.0;
 
-/// The surface with at most `most` triangles, as far as the coarsest grid allows; itself where it has no more.
+/// The surface with at most `most` triangles, as far as the coarsest grid allows; unchanged if it
+/// has no more.
 pub fn simplify(surface: &Surface, most: usize) -> Surface {
     if surface.triangles.len() <= most {
         return surface.clone();
@@ -25,7 +27,7 @@ pub fn simplify(surface: &Surface, most: usize) -> Surface {
     if longest <= 0.0 {
         return Surface::default();
     }
-    // The finest grid that keeps the budget; triangles fall as cells grow.
+    // Find the finest grid within the budget; the number of triangles falls as cells grow.
     let (mut coarse, mut fine) = (COARSEST.ln(), FINEST.ln());
     let mut best = cluster(surface, low, longest / COARSEST);
     for _ in 0..HALVINGS {
@@ -40,7 +42,7 @@ pub fn simplify(surface: &Surface, most: usize) -> Surface {
     best
 }
 
-/// One vertex a cell of a grid of this width, m.
+/// Merges the vertices in each cell of a grid of this width, m.
 fn cluster(surface: &Surface, low: [f64; 3], width: f64) -> Surface {
     let mut cells: HashMap<[i32; 3], usize> = HashMap::new();
     let mut sums: Vec<([f64; 3], f64)> = Vec::new();
@@ -67,7 +69,7 @@ fn cluster(surface: &Surface, low: [f64; 3], width: f64) -> Surface {
         if a == b || b == c || a == c {
             continue;
         }
-        // The same three again, in whatever order, is the other side of a sheet, or the same.
+        // The same three vertices in any order are the same triangle or the back of a sheet.
         let mut key = [a, b, c];
         key.sort_unstable();
         if seen.insert(key) {
@@ -117,7 +119,8 @@ mod tests {
             "{}",
             few.triangles.len()
         );
-        // A vertex is the mean of points of the ball in a cell of about 2/12 across: at most h^2/2 below the surface.
+        // A vertex is the mean of points of the ball in a cell of about 2/12 across: at most h^2/2
+        // below the surface.
         for t in &few.triangles {
             for v in t {
                 let r = few.vertices[*v as usize]

@@ -1,4 +1,4 @@
-//! A scene, ready to be drawn: its shapes in the frames of the parts that move as one.
+//! A scene, ready to be drawn: its shapes in the frames of rigid parts.
 
 use asid_core::{Result, Scene};
 use asid_mjcf::Plant;
@@ -13,19 +13,20 @@ use crate::contact::Touch;
 use crate::mesh;
 use crate::surface::Surface;
 
-/// Highest group of geoms that is drawn where a scene has any in it: MuJoCo's viewer shows groups 0 to 2.
+/// Highest group of geoms that is drawn, if a part has any up to it: MuJoCo's viewer shows groups
+/// 0 to 2.
 const SHOWN_GROUP: i32 = 2;
 
 /// A scene ready to be drawn.
 pub struct Stage<'p> {
     pub(crate) plant: &'p Plant,
-    /// Body at the head of each part; the world's is 0.
+    /// First body of each part; that of the world is 0.
     pub(crate) heads: Vec<usize>,
     /// Part of each body.
     pub(crate) part_of: Vec<usize>,
-    /// Geometry of what may touch.
+    /// Geometry of the shapes that may touch.
     pub(crate) touch: Touch,
-    /// Radius of the largest shape that has an end, m.
+    /// Radius of the largest bounded shape, m.
     pub(crate) reach: f64,
     shapes: Vec<Shape>,
     meshes: Vec<Surface>,
@@ -54,7 +55,7 @@ impl<'p> Stage<'p> {
         names.sort_unstable();
         names.dedup();
         let (mut surfaces, mut notes) = (Vec::new(), Vec::new());
-        // Place of each name among the meshes that could be read.
+        // Index of each name among the meshes that could be read.
         let mut read: Vec<Option<usize>> = Vec::new();
         for surface in mesh::of_scene(scene, &model, &names) {
             match surface {
@@ -70,7 +71,7 @@ impl<'p> Stage<'p> {
         }
         let mesh = |g: &Geom| read[names.iter().position(|n| Some(*n) == mesh_of(g))?];
 
-        // What the viewer of MuJoCo hides is hidden, unless nothing else is there of a part.
+        // Hide what MuJoCo's viewer hides, unless a part has nothing else.
         let visible = |g: &Geom| g.group <= SHOWN_GROUP;
         let has_visible: Vec<bool> = (0..heads.len())
             .map(|p| all.iter().any(|(b, g)| part_of[*b] == p && visible(g)))
@@ -121,7 +122,7 @@ impl<'p> Stage<'p> {
         self.heads[1..].iter().map(|&b| bodies[b]).collect()
     }
 
-    /// The view, still without episodes.
+    /// The view, without episodes.
     #[must_use]
     pub fn view(&self) -> View {
         View {
@@ -138,7 +139,7 @@ impl<'p> Stage<'p> {
     }
 }
 
-/// Radius of the largest shape that has an end, m.
+/// Radius of the largest bounded shape, m.
 fn reach(shapes: &[Shape], meshes: &[Surface]) -> f64 {
     let of = |shape: &Shape| match (shape.kind, shape.mesh) {
         (ShapeKind::Plane, _) => 0.0,
@@ -160,7 +161,7 @@ fn reach(shapes: &[Shape], meshes: &[Surface]) -> f64 {
     shapes.iter().map(of).fold(0.0, f64::max)
 }
 
-/// The pose as another library writes it.
+/// The pose in nalgebra's form.
 fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
     let (t, q) = (pose.translation, pose.rotation);
     Isometry3::from_parts(
@@ -169,7 +170,7 @@ fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
     )
 }
 
-/// The mesh that a geom is; a primitive that was fitted to one is itself.
+/// The mesh of a geom; `None` for a primitive, even one that was fitted to a mesh.
 fn mesh_of(geom: &Geom) -> Option<&str> {
     geom.mesh
         .as_deref()
@@ -217,7 +218,7 @@ mod tests {
         let stage = Stage::of(&scene, &plant).unwrap();
         let view = stage.view();
         assert_eq!(view.parts, ["world", "arm"]);
-        // The hand's sphere is of a group that is not shown.
+        // The hand's sphere is in a hidden group.
         let parts: Vec<usize> = view.shapes.iter().map(|s| s.part).collect();
         assert_eq!(parts, [0, 0, 1, 1]);
         assert_eq!(view.shapes[1].position, [0.0, 0.0, 1.0]);

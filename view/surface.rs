@@ -1,4 +1,4 @@
-//! Triangles in space, and how they are written for a page.
+//! Triangles in space, and their form for a page.
 
 use asid_results::view as out;
 
@@ -14,7 +14,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Lowest and highest corner.
+    /// Lowest and highest corner of the bounding box.
     #[must_use]
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
@@ -27,7 +27,7 @@ impl Surface {
         bounds
     }
 
-    /// For the page.
+    /// The surface in the form for the page.
     pub(crate) fn packed(&self) -> out::Mesh {
         let cube = Cube::around(self.vertices.iter().copied());
         let vertices: Vec<u16> = self.vertices.iter().flat_map(|p| cube.point(*p)).collect();
