@@ -1,6 +1,6 @@
-//! Lets the module find MuJoCo in the package that it lies in.
+//! Lets the module find MuJoCo in the package that contains it.
 
-// A build script speaks to cargo through its standard output.
+// A build script talks to cargo through its standard output.
 #![allow(clippy::print_stdout)]
 
 fn main() {

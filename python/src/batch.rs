@@ -1,28 +1,28 @@
-//! What goes to the thread that owns a batch of episodes, and what comes back.
+//! Messages to the thread that owns a batch of episodes, and its answers.
 
 use asid_algorithms::explore::environment::FisherEnvironment;
 use asid_core::{BatchEnvironment as _, Problem, Result, Transition};
 
 use crate::opened::streams;
 
-/// What is asked of a batch.
+/// A request to a batch.
 pub enum Call {
-    /// Draw all further chance from this seed.
+    /// Draw all further random numbers from this seed.
     Seed(u64),
-    /// Begin all episodes anew.
+    /// Restart all episodes.
     Reset,
     /// Take one control step with these actions, `n x action`, in [-1, 1].
     Step(Vec<f64>),
 }
 
-/// What does not change over a batch's life.
+/// What stays constant over a batch's life.
 #[derive(Clone, Debug)]
 pub struct Shape {
     /// Name and version of the engine.
     pub engine: String,
-    /// Entries of an observation: what they are, and how many.
+    /// Entries of an observation: their names and counts.
     pub entries: Vec<(String, usize)>,
-    /// Entries of an action: name, unit, and the range that [-1, 1] stands for.
+    /// Entries of an action: name, unit, and the range to which [-1, 1] maps.
     pub actions: Vec<(String, String, [f64; 2])>,
     /// The unknowns: name and unit.
     pub unknowns: Vec<(String, String)>,
@@ -52,7 +52,7 @@ impl Shape {
     }
 }
 
-/// Does what is asked of a batch; `None` for what has no answer.
+/// Executes a request on a batch; `None` for a request without an answer.
 pub fn answer(environment: &mut FisherEnvironment<'_>, call: Call) -> Option<Result<Transition>> {
     let (n, len) = (environment.batch_size(), environment.observation_len());
     let mut transition = Transition::new(n, len);

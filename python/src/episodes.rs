@@ -21,7 +21,8 @@ type Stepped<'py> = (
     Bound<'py, PyArray2<f32>>,
 );
 
-/// A batch of exploration episodes of a task, which step together; calls give the interpreter's lock away.
+/// A batch of exploration episodes of a task, which step together; calls give the interpreter's
+/// lock away.
 #[pyclass(module = "asid._native")]
 pub struct Episodes {
     worker: Worker,
@@ -29,7 +30,7 @@ pub struct Episodes {
     episodes: usize,
 }
 
-/// The settings of an episode's reward from their names.
+/// The settings of an episode's reward, from their names.
 fn fisher(
     objective: Option<&str>,
     form: Option<&str>,
@@ -143,7 +144,8 @@ impl Episodes {
 
     /// One control step: actions are episodes x entries from -1 to 1, and are clipped to that.
     ///
-    /// Returns observations to act on next, rewards, terminated, truncated, and the observations before any reset.
+    /// Returns observations to act on next, rewards, terminated, truncated, and the observations
+    /// before any reset.
     fn step<'py>(
         &mut self,
         py: Python<'py>,
@@ -181,7 +183,7 @@ impl Episodes {
 }
 
 impl Episodes {
-    /// An array of one row an episode.
+    /// An array with one row an episode.
     fn rows<'py>(&self, py: Python<'py>, all: &[f64]) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let single: Vec<f32> = all.iter().map(|&x| x as f32).collect();
         PyArray1::from_vec(py, single).reshape([self.episodes, all.len() / self.episodes])

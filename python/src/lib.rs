@@ -1,8 +1,8 @@
 //! The Python module `asid._native`: batches of exploration episodes, stepped in this process.
 //!
-//! Only what a learner calls thousands of times a second is here. Whole runs (`asid.diagnose` and the like) are the work of
-//! the program `asid` that lies in the same package: a fault of an engine then ends that program and not the notebook
-//! that called it.
+//! It contains only what a learner calls thousands of times a second. Whole runs (`asid.diagnose`
+//! and the like) use the program `asid` in the same package, so that a fault of an engine ends that
+//! program and not the calling notebook.
 
 mod batch;
 mod episodes;

@@ -1,4 +1,4 @@
-//! A task on an engine, with what its exploration is paid for.
+//! A task on an engine, with the reward of its exploration.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -8,24 +8,24 @@ use asid_core::progress::Silent;
 use asid_core::registry::{BackendEntry, TaskEntry, default_backend, find};
 use asid_core::{Backend, Error, Model, Parameter, Problem, Result, Streams, Task};
 
-/// What a batch of episodes is asked for.
+/// The request for a batch of episodes.
 #[derive(Clone, Debug)]
 pub struct Request {
     /// Name of the task.
     pub task: String,
-    /// Name of the engine; none for the one of the command line.
+    /// Name of the engine; `None` for the default of the command line.
     pub backend: Option<String>,
-    /// Episodes side by side.
+    /// Number of parallel episodes.
     pub episodes: usize,
-    /// What a step is paid for.
+    /// Settings of the reward of a step.
     pub fisher: FisherSettings,
     /// Threads; 0 for one a core.
     pub threads: usize,
-    /// Seed of all chance.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// What a problem borrows.
+/// The objects that a problem borrows.
 pub struct Opened {
     task: Box<dyn Task>,
     backend: Box<dyn Backend>,
@@ -36,7 +36,7 @@ pub struct Opened {
     seed: u64,
 }
 
-/// The streams of a seed, those of the command line's `--seed`.
+/// The streams of a seed, equal to those of the command line's `--seed`.
 pub fn streams(seed: u64) -> Streams {
     Streams::new(seed).sealed("method")
 }
@@ -72,7 +72,7 @@ impl Opened {
         format!("{} {}", self.backend.name(), self.backend.version())
     }
 
-    /// The problem, with the trackers' noise of the task.
+    /// The problem, with the task's tracker noise.
     pub fn problem(&self) -> Problem<'_> {
         Problem {
             task: &*self.task,
@@ -89,7 +89,7 @@ impl Opened {
     }
 }
 
-/// The engine of this name, where it can do what the task needs.
+/// The engine of this name, after checking that it can do what the task needs.
 fn backend(name: Option<&str>, task: &dyn Task) -> Result<Box<dyn Backend>> {
     let entry = match name {
         Some(name) => find::<BackendEntry>(name)?,

@@ -1,8 +1,8 @@
 //! A thread that owns a batch of episodes.
 //!
-//! The environment borrows the problem, and that the task and the engine: on one thread's stack they lie in that order, and
-//! Python holds the two ends of channels, which borrow nothing. A message costs some microseconds, a step of a
-//! batch a millisecond and more.
+//! The environment borrows the problem, which borrows the task and the engine. They lie in that
+//! order on one thread's stack. Python holds the ends of the two channels, which borrow nothing. A
+//! message costs some microseconds, a step of a batch a millisecond or more.
 
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -16,27 +16,28 @@ use crate::batch::{Call, Shape, answer};
 use crate::failure::{ended, exception};
 use crate::opened::{Opened, Request};
 
-/// How long a wait is until Python is asked for signals again, such as that of Ctrl-C: shorter than a person notices.
+/// Interval at which a wait checks Python for signals such as that of Ctrl-C: shorter than a person
+/// notices.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// An answer, and the time that the simulator took for it, s.
+/// An answer, and the simulator's time for it, s.
 type Timed = (Result<Transition>, f64);
 
 /// The ends of the channels.
 pub struct Worker {
     calls: Sender<Call>,
     answers: Mutex<Receiver<Timed>>,
-    /// A call was interrupted: its answer is still to come.
+    /// Whether a call was interrupted whose answer is still to come.
     outstanding: bool,
-    /// Time that the simulator took for all answers, s.
+    /// The simulator's time for all answers, s.
     pub seconds: f64,
 }
 
 impl Worker {
-    /// Starts the thread, and waits until all is loaded.
+    /// Starts the thread, and waits until everything is loaded.
     ///
     /// # Errors
-    /// As an exception, where the task, the engine or the settings do not go together.
+    /// As an exception, when the task, the engine or the settings are incompatible.
     pub fn start(py: Python<'_>, request: Request) -> PyResult<(Self, Shape)> {
         let (calls, called) = channel();
         let (answering, answers) = channel();
@@ -48,7 +49,7 @@ impl Worker {
                     Ok(()) => return,
                     Err(error) => error,
                 };
-                // Nobody waits any more where the batch had been opened.
+                // If the batch was already open, nobody waits for this message.
                 let _ = opening.send(Err(failed));
             })?;
         let shape = wait(py, &Mutex::new(opened))?.map_err(|e| exception(&e))?;
@@ -64,18 +65,18 @@ impl Worker {
     /// Sends a call that has no answer.
     ///
     /// # Errors
-    /// Where the thread has ended.
+    /// When the thread has ended.
     pub fn tell(&self, call: Call) -> PyResult<()> {
         self.calls.send(call).map_err(|_| ended())
     }
 
-    /// Sends a call and waits for its answer, without the interpreter's lock.
+    /// Sends a call and waits for its answer, without holding the interpreter's lock.
     ///
     /// # Errors
-    /// Where the engine fails, or a signal's handler raises, as that of Ctrl-C does.
+    /// When the engine fails, or a signal handler raises, as for Ctrl-C.
     pub fn ask(&mut self, py: Python<'_>, call: Call) -> PyResult<Transition> {
         if self.outstanding {
-            // The answer to a call that was interrupted is nobody's.
+            // Discard the answer to a call that was interrupted.
             let _ = wait(py, &self.answers)?;
             self.outstanding = false;
         }
@@ -88,7 +89,7 @@ impl Worker {
     }
 }
 
-/// The thread's life: all is opened, then one call after the other is answered.
+/// Body of the thread: opens everything, then answers one call after the other.
 fn own(
     request: &Request,
     opening: &Sender<Result<Shape>>,
@@ -115,7 +116,7 @@ fn own(
     Ok(())
 }
 
-/// Waits for a message without the interpreter's lock, and looks at signals now and then.
+/// Waits for a message without holding the interpreter's lock, and checks for signals periodically.
 fn wait<T: Send>(py: Python<'_>, messages: &Mutex<Receiver<T>>) -> PyResult<T> {
     loop {
         let next = py.detach(|| match messages.lock() {
