@@ -1,10 +1,9 @@
-//! The report of a diagnosis: where simulation leaves reality, which effect is missing, and
-//! how far the gap shrinks with it.
+//! The report of a diagnosis: where simulation and reality differ, which effect is missing, and how
+//! far the gap shrinks with it.
 //!
-//! It is drawn from `result.json` and `trace.json` ([`asid_results`]). Gaps are in units of
-//! the sensors' noise, all else in the units that stand beside it. Whatever a diagnosis
-//! does not have stays empty (`None`, NaN, an empty `Vec`) and is left out, with a remark
-//! where a reader would look for it.
+//! It is drawn from `result.json` and `trace.json` ([`asid_results`]). Gaps are in units of the
+//! sensors' noise, all else in the stated units. Whatever a diagnosis does not have stays empty
+//! (`None`, NaN, an empty `Vec`). It is left out, with a remark where a reader would look for it.
 //!
 //! ```
 //! use asid_results::diagnosis::DiagnosisResult;
@@ -32,7 +31,7 @@ pub use words::values as effect_values;
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::trace::DiagnosisTrace;
 
-/// What the 3-D view shows.
+/// Caption of the 3-D view.
 const MACHINE: &str = "As logged, and as simulated by the recorded commands from the same start. Drag to turn it. The slider moves \
                        the line in the plots below; a click in a plot moves the slider.";
 

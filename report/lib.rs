@@ -2,15 +2,14 @@
 //!
 //! Three layers, each usable on its own:
 //!
-//! - [`plot`] draws charts and plan views as SVG. All colours are CSS
-//!   variables, so that one drawing serves a light and a dark page.
+//! - [`plot`] draws charts and plan views as SVG. All colours are CSS variables, so that one
+//!   drawing serves a light and a dark page.
 //! - [`page`] is the shell: header, tiles, sections, figures, tables, and the machine in 3-D.
-//! - [`run`] holds what the report of a run shows, as plain data that is
-//!   stored as `trace.json` in the run's folder, and writes it as a page.
-//!   [`diagnosis`] does the same for what a diagnosis found, from the types of `asid-results`.
+//! - [`run`] holds the data of a run's report, which are stored as `trace.json` in the run's
+//!   folder, and writes it as a page. [`diagnosis`] does the same for a diagnosis, from the types
+//!   of `asid-results`.
 //!
-//! Nothing here fails on strange numbers: a point that is not finite is not
-//! drawn, and in a table it reads `n/a`.
+//! Non-finite numbers cause no failure: such a point is not drawn, and a table shows `n/a`.
 
 pub mod diagnosis;
 pub mod markup;

@@ -1,7 +1,7 @@
-//! Text on its way into HTML and SVG: escaping, and how wide it will be.
+//! Text for HTML and SVG: escaping and width estimates.
 //!
-//! A file without scripts cannot measure its own text, so layout works with an
-//! estimate that is on the generous side of the common sans-serif fonts.
+//! A file without scripts cannot measure its own text, so layout works with an estimate that is
+//! generous for the common sans-serif fonts.
 
 /// `text` with the five XML special characters escaped and control characters removed.
 #[must_use]
@@ -15,7 +15,7 @@ pub fn escape(text: &str) -> String {
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
             '\n' | '\t' => escaped.push(c),
-            // XML 1.0 has no way to write these.
+            // XML 1.0 cannot represent these.
             c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => {}
             c => escaped.push(c),
         }
@@ -42,13 +42,14 @@ fn advance(c: char) -> f64 {
         'A'..='Z' | '_' => 0.7,
         '−' | '±' | '×' | '=' | '+' => 0.84,
         c if c.is_ascii() => 0.65,
-        // Latin with accents and Greek are about as wide as other letters; the rest may be twice that.
+        // Accented Latin and Greek letters are about as wide as other letters; the rest may be
+        // twice that.
         c if (c as u32) < 0x0500 => 0.68,
         _ => 1.0,
     }
 }
 
-/// `text`, cut with an ellipsis where it would be wider than `width` at `size`.
+/// `text`, truncated with an ellipsis if it would be wider than `width` at `size`.
 #[must_use]
 pub fn fit(text: &str, size: f64, width: f64) -> String {
     if text_width(text, size) <= width {
@@ -68,7 +69,8 @@ pub fn fit(text: &str, size: f64, width: f64) -> String {
     kept
 }
 
-/// `text` with its first letter in upper case, unless it begins with an identifier such as `rod_yaw`.
+/// `text` with its first letter in upper case, unless it begins with an identifier such as
+/// `rod_yaw`.
 #[must_use]
 pub fn capitalise(text: &str) -> String {
     if text

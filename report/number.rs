@@ -1,6 +1,6 @@
-//! Numbers as a reader wants them: few digits, real minus signs, units.
+//! Readable numbers: few digits, real minus signs, units.
 
-/// What stands for a number that is not finite.
+/// Text for a non-finite number.
 pub const NOT_A_NUMBER: &str = "n/a";
 
 /// `value` with `digits` significant digits; powers of ten outside `1e-4..1e6`.
@@ -13,7 +13,7 @@ pub fn significant(value: f64, digits: usize) -> String {
         return "0".to_owned();
     }
     let digits = digits.clamp(1, 15);
-    // The exponent after rounding: 9.99 at two digits is 10.
+    // Take the exponent after rounding: 9.99 at two digits is 10.
     let scientific = format!("{:.*e}", digits - 1, value);
     let (mantissa, exponent) = split_exponent(&scientific);
     if (-4..6).contains(&exponent) {
@@ -23,7 +23,8 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// Like [`significant`], without zeros at the end of the decimals: for round numbers such as limits and ranges.
+/// Like [`significant`], without trailing zeros in the decimals: for round numbers such as limits
+/// and ranges.
 #[must_use]
 pub fn round(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
@@ -58,14 +59,15 @@ pub fn decimals(value: f64, decimals: usize) -> String {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precision {
-    /// Decimals after division by `10^exponent`; four significant digits where there is no uncertainty.
+    /// Decimals after division by `10^exponent`; `None` (four significant digits) without an
+    /// uncertainty.
     places: Option<usize>,
-    /// A multiple of three, 0 for numbers of a handy size.
+    /// A multiple of three; 0 for numbers of moderate size.
     exponent: i32,
 }
 
 impl Precision {
-    /// Enough for two significant digits of `uncertainty`, which may be NaN where none is known.
+    /// Precision for two significant digits of `uncertainty`, which may be NaN if unknown.
     #[must_use]
     pub fn of(value: f64, uncertainty: f64) -> Self {
         if !(uncertainty.is_finite() && uncertainty > 0.0 && value.is_finite()) {
@@ -104,7 +106,7 @@ impl Precision {
         }
     }
 
-    /// `value ± uncertainty`; only the value where there is no uncertainty.
+    /// `value ± uncertainty`, or only the value without an uncertainty.
     #[must_use]
     pub fn with_uncertainty(self, value: f64, uncertainty: f64) -> String {
         if self.places.is_none() {
@@ -138,7 +140,7 @@ impl Precision {
     }
 }
 
-/// A whole number in groups of three, set apart by a narrow no-break space.
+/// A whole number in groups of three digits, separated by a narrow no-break space.
 #[must_use]
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
@@ -152,7 +154,8 @@ pub fn grouped(value: u64) -> String {
     out
 }
 
-/// A number and its unit: `0.061 m`, `0.3°`. `deg` is shown as `°`, `1` and an empty unit as nothing.
+/// A number and its unit: `0.061 m`, `0.3°`. `deg` is shown as `°`; `1` and an empty unit are
+/// omitted.
 #[must_use]
 pub fn quantity(number: &str, unit: &str) -> String {
     match unit_symbol(unit) {

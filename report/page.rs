@@ -41,17 +41,17 @@ use crate::style::STYLE;
 
 const SCRIPT: &str = include_str!("page/copy.js");
 
-/// How a tile or a table cell is meant.
+/// The tone of a tile or table cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
-    /// A fact.
+    /// A neutral fact.
     #[default]
     Plain,
-    /// As one hopes.
+    /// Favourable.
     Good,
-    /// Short of it, as is known and accepted.
+    /// Not ideal, but known and accepted.
     Fair,
-    /// Not as one hopes.
+    /// Unfavourable.
     Bad,
 }
 
@@ -97,7 +97,7 @@ impl Page {
         }
     }
 
-    /// Sets the small line over the title: what kind of report this is.
+    /// Sets the small line over the title: the kind of report.
     #[must_use]
     pub fn kicker(mut self, kicker: &str) -> Self {
         self.kicker = kicker.to_owned();
@@ -111,21 +111,21 @@ impl Page {
         self
     }
 
-    /// Sets the answer in one sentence where it is what the page is for: larger, above the lead.
+    /// Sets the answer in one sentence, if it is the purpose of the page: larger, above the lead.
     #[must_use]
     pub fn answer(mut self, answer: impl Into<String>) -> Self {
         self.answer = answer.into();
         self
     }
 
-    /// Sets a word beside the title, such as `success`.
+    /// Sets a badge beside the title, such as `success`.
     #[must_use]
     pub fn badge(mut self, text: &str, tone: Tone) -> Self {
         self.badge = Some((text.to_owned(), tone));
         self
     }
 
-    /// Adds a line of the header: a name and what it is.
+    /// Adds a line of the header: a name and its value.
     #[must_use]
     pub fn fact(mut self, name: &str, value: impl Into<String>) -> Self {
         self.facts.push((name.to_owned(), value.into()));
@@ -200,8 +200,8 @@ impl Page {
     }
 }
 
-/// Style sheet and script of what moves on a page: the machine in 3-D, and plots over time. Nothing where neither is
-/// there. The script is XML as well as HTML.
+/// Style sheet and script of the interactive parts of a page: the machine in 3-D, and plots over
+/// time. Empty if there are none. The script is valid in XML and in HTML.
 fn player(sections: &str, has_view: bool) -> (&'static str, String) {
     if !has_view && !time::has_plots(sections) {
         return ("", String::new());
@@ -221,7 +221,7 @@ mod tests {
         let document = roxmltree::Document::parse(script.trim()).unwrap();
         let text = document.root_element().text().unwrap();
         assert!(text.contains("function Player") && text.contains("uPlot"));
-        // A report is to stay under 3 MB, and what draws it a small part of that.
+        // A report must stay under 3 MB, of which the drawing code is a small part.
         assert!(script.len() < 150_000, "{}", script.len());
         assert_eq!(script.matches("]]>").count(), 1);
         assert_eq!(player("<svg></svg>", false), ("", String::new()));

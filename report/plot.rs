@@ -1,19 +1,16 @@
 //! Plots as SVG text, with no script, no font file and no fixed colour.
 //!
-//! A plot is a plain value that knows its data; [`Plot::svg`] lays it out for
-//! one width. Widths are in SVG units: [`NARROW`] is drawn at about one unit a
-//! pixel beside another plot and still reads at 380 px, [`WIDE`] fills a whole
-//! row on a desk's screen. Text sizes are fixed in these units, which is why a
-//! wide plot is laid out anew and not scaled.
+//! A plot is a plain value that knows its data; [`Plot::svg`] lays it out for one width. Widths are
+//! in SVG units. [`NARROW`] is drawn at about one unit a pixel beside another plot and is readable
+//! at 380 px; [`WIDE`] fills a whole row on a desktop screen. Text sizes are fixed in these units,
+//! so a wide plot has a new layout instead of a larger scale.
 //!
-//! Colours are CSS classes (`c-blue`, …) that set `--c`; [`crate::page`] holds
-//! the values for light and dark pages. They are the Okabe-Ito hues, told apart
-//! by people with any common colour blindness, darkened or lightened until text
-//! in them has a contrast of 4.5 to 1.
+//! Colours are CSS classes (`c-blue`, …) that set `--c`; [`crate::page`] holds the values for light
+//! and dark pages. They are the Okabe-Ito hues, which people with any common colour blindness can
+//! distinguish. They are darkened or lightened until text in them has a contrast of 4.5 to 1.
 //!
-//! Text never overlaps: the axis label and the legend flow in rows above the
-//! plot, labels of marker lines are put into lanes below them, and ticks are
-//! thinned until they fit.
+//! Text never overlaps. The axis label and the legend flow in rows above the plot, labels of marker
+//! lines are put into lanes below them, and ticks are thinned until they fit.
 
 mod chart;
 mod clock;
@@ -41,16 +38,16 @@ pub use plan::Plan;
 pub use ranking::{Ranked, Ranking};
 pub use scale::{Scale, Spacing, Ticks};
 
-/// Width of a plot that stands beside another one, in SVG units.
+/// Width of a plot beside another one, in SVG units.
 pub const NARROW: f64 = 420.0;
-/// Width of a plot that has a row to itself, in SVG units.
+/// Width of a plot with a row to itself, in SVG units.
 pub const WIDE: f64 = 880.0;
 /// Size of all text in a plot, in SVG units.
 pub const FONT_SIZE: f64 = 12.5;
 
 /// Something that can be drawn as one SVG element.
 pub trait Plot {
-    /// The SVG element, `width` units wide and as high as it needs to be.
+    /// The SVG element, `width` units wide and as high as necessary.
     ///
     /// `id` prefixes every identifier in it and must be unique on the page.
     fn svg(&self, id: &str, width: f64) -> String;
@@ -62,17 +59,17 @@ impl<P: Plot + ?Sized> Plot for std::sync::Arc<P> {
     }
 }
 
-/// A colour by its role in the palette; the page decides the value.
+/// A colour by its role in the palette; the page defines the value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Colour {
     /// Text colour: measured reality and truth.
     #[default]
     Ink,
-    /// Grey: what was believed before, context.
+    /// Grey: prior belief, context.
     Muted,
     /// Blue: what was identified.
     Blue,
-    /// Vermillion: what moves, or a warning.
+    /// Vermillion: moving things, or a warning.
     Vermillion,
     /// Green: goals and success.
     Green,
@@ -80,7 +77,7 @@ pub enum Colour {
     Purple,
     /// Ochre.
     Ochre,
-    /// The first of four steps from little to much.
+    /// The first of four levels from low to high.
     Cool,
     /// The second.
     Warm,
@@ -121,7 +118,7 @@ pub(crate) fn coordinate(value: f64) -> String {
     }
 }
 
-/// The root element with title and description for those who cannot see the drawing.
+/// The root element, with title and description for screen readers.
 pub(crate) fn root(id: &str, size: [f64; 2], title: &str, description: &str, body: &str) -> String {
     use crate::markup::escape;
     let [width, height] = size;

@@ -1,12 +1,12 @@
 //! The report of a run: what happened, as data and as a page.
 //!
-//! [`RunReport`] holds everything that the page shows. It is stored as
-//! `trace.json` beside `result.json`, so that the page can be written again
-//! from files alone. All quantities are in SI units, seconds and radians unless
-//! a `unit` field says otherwise; a `unit` is for display (`m`, `rad`, `deg`).
+//! [`RunReport`] holds everything that the page shows. It is stored as `trace.json` beside
+//! `result.json`, so that the page can be written again from files alone. All quantities are in SI
+//! units, seconds and radians unless a `unit` field says otherwise; a `unit` is for display (`m`,
+//! `rad`, `deg`).
 //!
-//! Whatever a run does not have stays empty (`None`, an empty `Vec`): its part
-//! of the page is left out, with a remark where a reader would look for it.
+//! Whatever a run does not have stays empty (`None`, an empty `Vec`): its part of the page is left
+//! out, with a remark where a reader would look for it.
 //!
 //! ```
 //! use asid_report::run::RunReport;
@@ -42,12 +42,12 @@ pub const TRACE_FILE: &str = "trace.json";
 /// Name of the page in a run's folder.
 pub const REPORT_FILE: &str = "report.html";
 
-/// What the 3-D view shows.
+/// Caption of the 3-D view.
 const MACHINE: &str = "The episode in 3-D. Drag to turn it. The slider moves the line in the plots below; a click in a plot \
                        moves the slider.";
 
 impl RunReport {
-    /// Whether the simulator predicted what is shown: nothing was done in the real world yet.
+    /// Whether the simulator predicted what is shown, without anything done in the real world.
     fn predicted(&self) -> bool {
         matches!(self.stage.as_str(), "explore" | "solve")
     }
@@ -75,10 +75,10 @@ impl RunReport {
         page.html()
     }
 
-    /// The content of `trace.json`. A number that is not finite is written as `null` and read back as NaN.
+    /// The content of `trace.json`. A non-finite number is written as `null` and read as NaN.
     ///
     /// # Errors
-    /// [`Error::Failed`] where serialisation fails, which no content of these types makes it do.
+    /// [`Error::Failed`] when serialisation fails, which no content of these types causes.
     pub fn to_json(&self) -> Result<String> {
         serde_json::to_string(self).map_err(|e| Error::Failed(format!("{TRACE_FILE}: {e}")))
     }
@@ -86,9 +86,9 @@ impl RunReport {
     /// Reads the content of a `trace.json`.
     ///
     /// # Errors
-    /// [`Error::Failed`] where the text is no such file, or one of a newer version.
+    /// [`Error::Failed`] when the text is not such a file, or is of a newer version.
     pub fn from_json(text: &str) -> Result<Self> {
-        // The version first: of a newer layout nothing else need be readable.
+        // Read the version first: in a newer layout the rest may be unreadable.
         #[derive(serde::Deserialize)]
         struct Version {
             schema: u32,
@@ -104,10 +104,10 @@ impl RunReport {
         serde_json::from_str(text).map_err(failed)
     }
 
-    /// Writes `trace.json` and `report.html` into `folder`, replacing those there are.
+    /// Writes `trace.json` and `report.html` into `folder`, replacing existing ones.
     ///
     /// # Errors
-    /// [`Error::File`] where a file cannot be written.
+    /// [`Error::File`] when a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         write(&folder.join(TRACE_FILE), &self.to_json()?)?;
         write(&folder.join(REPORT_FILE), &self.html())
@@ -116,7 +116,7 @@ impl RunReport {
     /// Reads the `trace.json` of a finished run's folder.
     ///
     /// # Errors
-    /// [`Error::File`] where it cannot be read or is not a trace.
+    /// [`Error::File`] when it cannot be read or is not a trace.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(TRACE_FILE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::File {
@@ -130,7 +130,7 @@ impl RunReport {
     }
 }
 
-/// Writes a file whole or not at all: beside its place first, then moved there.
+/// Writes a file whole or not at all: first under a temporary name, then renamed.
 fn write(path: &Path, text: &str) -> Result<()> {
     let failed = |e: std::io::Error| Error::File {
         path: path.to_path_buf(),

@@ -1,4 +1,4 @@
-//! Which effect: probabilities, the verdict in words, and the effects with their values.
+//! The causes: probabilities, the verdict in words, and the effects with their values.
 
 use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult, Kind};
 use asid_results::trace::DiagnosisTrace;
@@ -13,10 +13,10 @@ use crate::number::NOT_A_NUMBER;
 use crate::page::{Cell, Column, Figure, Section, Table};
 use crate::plot::{Axis, Colour, Ranked, Ranking};
 
-/// Hypotheses that are shown one by one.
+/// Number of hypotheses that are shown individually.
 const MOST: usize = 10;
 
-/// Probability under which an effect that is in no verdict is folded away.
+/// Probability below which an effect outside every verdict is folded away.
 const LITTLE: f64 = 0.01;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
@@ -43,14 +43,14 @@ pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     section
 }
 
-/// Whether an effect is probable, in the verdict, or cannot be told from it.
+/// Whether an effect is probable, part of the verdict, or indistinguishable from it.
 fn matters(d: &DiagnosisResult, effect: &EffectResult) -> bool {
     let label = effect.label();
     let sets = d.verdict.ambiguous_with.iter().chain([&d.verdict.effects]);
     effect.probability >= LITTLE || sets.flatten().any(|e| *e == label)
 }
 
-/// The verdict in words, a paragraph each for what it is and what it leaves open.
+/// The verdict in words: one paragraph each on what it is and on what it leaves open.
 fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     let found = found(d);
     let sure = probability(d.verdict.probability);
@@ -120,7 +120,8 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     paragraphs
 }
 
-/// What an effect is and how strong, as a sentence with a space before it; by name where it is not the only one.
+/// What an effect is and how strong, as a sentence with a space before it. It is named if there are
+/// several.
 fn described(t: &DiagnosisTrace, effect: &EffectResult, by_name: bool) -> String {
     let values = match &*values(t, effect) {
         "" => String::new(),
@@ -137,7 +138,7 @@ fn described(t: &DiagnosisTrace, effect: &EffectResult, by_name: bool) -> String
 
 fn figure(d: &DiagnosisResult) -> Figure {
     let special = |h: &HypothesisResult| matches!(&*hypothesis(h).0, "none" | "unknown");
-    // `none` and `unknown` are always told, however improbable.
+    // `none` and `unknown` are always shown, however improbable.
     let shown = |(i, h): &(usize, &HypothesisResult)| *i < MOST || special(h);
     let all = || d.hypotheses.iter().enumerate();
     let mut rows: Vec<Ranked> = all().filter(shown).map(|(_, h)| row(d, h)).collect();

@@ -1,4 +1,5 @@
-//! The end of the page: the study's parameters, the checks, what to do next, and how to repeat it.
+//! The end of the page: the study's parameters, the checks, the next steps, and the command that
+//! repeats it.
 
 use asid_results::diagnosis::{DiagnosisResult, Kind, ParameterResult};
 use asid_results::trace::DiagnosisTrace;

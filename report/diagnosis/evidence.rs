@@ -1,4 +1,5 @@
-//! How the sets of effects rank by evidence, and which of the leading effects these logs can tell apart.
+//! The ranking of effect sets by evidence, and which of the leading effects these logs can
+//! distinguish.
 
 use asid_results::diagnosis::{DiagnosisResult, Isolability, RankedSet};
 
@@ -7,9 +8,10 @@ use crate::number::significant;
 use crate::page::Figure;
 use crate::plot::{Axis, Colour, Heat, Ranked, Ranking};
 
-/// Sets that are shown.
+/// Number of sets that are shown.
 const MOST: usize = 12;
-/// Evidence from which on a set is shown, natural logarithm: less is against it.
+/// Least evidence of a set that is shown, natural logarithm: below it the evidence is against the
+/// set.
 const LEAST: f64 = 0.0;
 
 /// The pictures.

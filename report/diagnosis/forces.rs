@@ -1,4 +1,4 @@
-//! Which force is missing, moment by moment: against time, speed, position and load, with the law that was fitted.
+//! The missing force against time, speed, position and load, with the fitted law.
 
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::trace::{DiagnosisTrace, ForceSeries, ForceTrace};
@@ -9,13 +9,14 @@ use crate::number::{quantity, significant};
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer};
 
-/// Degrees of freedom that are in sight; the others are folded away.
+/// Degrees of freedom that are unfolded; the others are folded away.
 const UNFOLDED: usize = 2;
-/// Room for tick labels, SVG units, the same for the plots of a figure.
+/// Room for tick labels, in SVG units, the same for the plots of a figure.
 const GUTTER: f64 = 44.0;
-/// Fewest points that a cloud is drawn of.
+/// Fewest points for which a scatter plot is drawn.
 const FEWEST: usize = 8;
-/// Spread of a column, relative to its largest magnitude, below which nothing can be seen against it.
+/// Spread of a column, relative to its largest magnitude, below which a plot against it shows
+/// nothing.
 const SPREAD: f64 = 1e-3;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Option<Section> {
@@ -61,7 +62,7 @@ fn finite_in(values: &[f64]) -> bool {
     values.iter().any(|x| x.is_finite())
 }
 
-/// The degree of freedom, and how much is missing there before and after.
+/// The degree of freedom, and how much force is missing there before and after.
 fn heading(d: &DiagnosisResult, force: &ForceTrace, law: bool) -> String {
     let Some(m) = d.missing_force.iter().find(|m| m.dof == force.dof) else {
         return force.dof.clone();
@@ -99,7 +100,7 @@ fn figures(force: &ForceTrace, law: bool) -> Vec<Figure> {
         .collect()
 }
 
-/// Whether a column has enough of different values to draw something against.
+/// Whether a column has enough distinct values for a plot against it.
 fn varies(x: &[f64]) -> bool {
     let there = || x.iter().copied().filter(|x| x.is_finite());
     let [low, high] = there().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], x| {
@@ -141,7 +142,7 @@ fn against_time(force: &ForceTrace, law: bool) -> Figure {
     Figure::new("Against time", chart.description(caption.clone()), caption)
 }
 
-/// The missing force over a column, and the law over the same.
+/// The missing force over a column, with the law over the same column.
 fn cloud(
     force: &ForceTrace,
     law: bool,

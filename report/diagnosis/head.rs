@@ -138,7 +138,7 @@ fn closed(d: &DiagnosisResult) -> Tile {
         .tone(tone)
 }
 
-/// Whether there is a refined model that is another one than the identified.
+/// Whether there is a refined model that differs from the identified one.
 pub(super) fn refined(d: &DiagnosisResult) -> bool {
     !found(d).is_empty() || (d.gap.refined - d.gap.identified).abs() > 1e-9
 }

@@ -1,4 +1,4 @@
-//! How far each step and each single effect brings simulation to reality.
+//! How far each step and each single effect reduces the gap.
 
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::trace::DiagnosisTrace;
@@ -9,10 +9,10 @@ use crate::number::{quantity, significant};
 use crate::page::{Cell, Column, Figure, Section, Table};
 use crate::plot::{Axis, Colour, Ranked, Ranking, Spacing};
 
-/// Single effects that are shown.
+/// Number of single effects that are shown.
 const MOST: usize = 16;
 
-/// Ratio of the largest to the smallest gap from which on the axis is logarithmic.
+/// Ratio of the largest to the smallest gap above which the axis is logarithmic.
 const DECADES: f64 = 8.0;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {

@@ -1,21 +1,22 @@
-//! Recorded series made ready to be drawn: gaps where readings are missing, few enough
-//! points, and an axis that a diverging simulation does not squash.
+//! Prepares recorded series for drawing: gaps where readings are missing, few enough points, and an
+//! axis that a diverging simulation does not distort.
 
-/// Readings up to which each is drawn as a dot.
+/// Largest number of readings that are all drawn as dots.
 pub(super) const MOST_DOTS: usize = 120;
 
-/// Dots that are drawn of a series at most.
+/// Largest number of dots drawn of a series.
 const DOTS: usize = 300;
 
-/// Points of a line, about.
+/// Approximate number of points of a line.
 const POINTS: usize = 440;
 
-/// Multiple of the usual time between readings that counts as a gap.
+/// A gap is longer than the usual time between readings by this factor.
 const GAP: f64 = 2.6;
 
-/// Points `[t, value]` of what is there, interrupted by a NaN where readings are missing for longer than usual.
+/// Points `[t, value]` of the existing readings, separated by a NaN where readings are missing for
+/// longer than usual.
 ///
-/// A sensor that is slower than the log has empty rows between any two readings: they are no gaps.
+/// A sensor that is slower than the log has empty rows between any two readings; these are no gaps.
 pub(super) fn stretches(time: &[f64], values: &[f64]) -> Vec<[f64; 2]> {
     let there: Vec<[f64; 2]> = (time.iter().zip(values))
         .map(|(&t, &v)| [t, v])
@@ -34,7 +35,7 @@ pub(super) fn stretches(time: &[f64], values: &[f64]) -> Vec<[f64; 2]> {
     points
 }
 
-/// The lowest and the highest of each part of a stretch, about `most` points in all.
+/// The lowest and the highest point of each part of a stretch, about `most` points in total.
 fn thin(stretch: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
     if stretch.len() <= most.max(4) {
         return stretch.to_vec();
@@ -53,12 +54,12 @@ fn thin(stretch: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
     stretch.chunks(part).flat_map(ends).collect()
 }
 
-/// Number of points that are there.
+/// Number of finite points.
 pub(super) fn finite(points: &[[f64; 2]]) -> usize {
     points.iter().filter(|p| p[1].is_finite()).count()
 }
 
-/// Number of points with a gap on both sides: a line does not show them.
+/// Number of points with a gap on both sides, which a line does not show.
 pub(super) fn lone(points: &[[f64; 2]]) -> usize {
     points
         .split(|p| !p[1].is_finite())
@@ -66,7 +67,7 @@ pub(super) fn lone(points: &[[f64; 2]]) -> usize {
         .count()
 }
 
-/// Evenly chosen points, few enough to be dots.
+/// Evenly chosen points, few enough to draw as dots.
 pub(super) fn dots(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let there = points.iter().filter(|p| p[1].is_finite());
     there
@@ -75,8 +76,8 @@ pub(super) fn dots(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Domain of an axis that holds all of the real readings, and of the simulations what is at most as far from
-/// them as they spread; `None` where there is nothing.
+/// Domain of an axis that contains all real readings, and simulated values within one spread of the
+/// readings beyond them; `None` where there is nothing.
 pub(super) fn reach<'a>(
     real: &[f64],
     simulated: impl Iterator<Item = &'a [f64]>,
@@ -111,7 +112,8 @@ pub(super) fn reach<'a>(
     Some([low - room, high + room])
 }
 
-/// A domain that reaches at least `least` to both sides of zero, and that a few outliers do not stretch.
+/// A domain that reaches at least `least` to both sides of zero, and that a few outliers do not
+/// stretch.
 pub(super) fn around_zero(values: impl Iterator<Item = f64>, least: f64) -> [f64; 2] {
     let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
@@ -128,7 +130,7 @@ pub(super) fn around_zero(values: impl Iterator<Item = f64>, least: f64) -> [f64
     if ends[0] < ends[1] { ends } else { [-1.0, 1.0] }
 }
 
-/// First and last of the times; `None` where there are none.
+/// First and last of the times; `None` if there are none.
 pub(super) fn span(time: &[f64]) -> Option<[f64; 2]> {
     let finite = || time.iter().copied().filter(|t| t.is_finite());
     Some([finite().reduce(f64::min)?, finite().reduce(f64::max)?])

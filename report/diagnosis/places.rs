@@ -7,13 +7,13 @@ use super::words::percent;
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Colour, Outline, Plan, Ranked, Ranking};
 
-/// Places that are shown one by one.
+/// Number of places that are shown individually.
 const MOST: usize = 12;
 
-/// Points of the map that are drawn.
+/// Number of points of the map that are drawn.
 const POINTS: usize = 2500;
 
-/// Residuals, in units of the noise, at which the colour of a point changes.
+/// Residuals at which the colour of a point changes, in units of the noise.
 const STEPS: [f64; 3] = [2.0, 5.0, 20.0];
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
@@ -94,7 +94,7 @@ fn plan(map: &Map) -> Figure {
         Axis::new(y, &map.unit),
     )
     .description(caption);
-    // The worst are drawn last, over the others.
+    // Draw the worst last, on top of the others.
     let colours = [Colour::Cool, Colour::Warm, Colour::Hot, Colour::Fierce];
     for (i, colour) in colours.into_iter().enumerate() {
         let here: Vec<[f64; 2]> = (points.iter())

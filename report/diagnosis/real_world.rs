@@ -1,4 +1,4 @@
-//! What the answer is worth where it counts: the task in the real world, before and after.
+//! The value of the answer in practice: the task in the real world, before and after.
 
 use asid_results::diagnosis::{DiagnosisResult, RealWorld, TaskTrial};
 

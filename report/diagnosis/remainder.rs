@@ -1,4 +1,5 @@
-//! How the gap is shared out, what is left beside the verdict, and what these logs could have shown at all.
+//! How the gap divides among causes, what remains beside the verdict, and what these logs could
+//! have shown at all.
 
 use asid_results::diagnosis::{Calibration, DetectionLimit, DiagnosisResult, Remainder, Shares};
 
@@ -41,7 +42,7 @@ pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
     Some(section)
 }
 
-/// What simulated logs say of the answer.
+/// Text on the answer's calibration by simulated logs.
 fn summed(c: &Calibration) -> String {
     let mut text = format!(
         "The model played the commands of the logs {} times, with nothing missing and with each of the leading explanations, and the \

@@ -1,4 +1,4 @@
-//! Held-out episodes signal by signal: real against simulated, and what is left.
+//! Held-out episodes signal by signal: real against simulated readings, and the residuals.
 
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::trace::{DiagnosisTrace, SignalTrace};
@@ -10,12 +10,12 @@ use crate::number::{quantity, significant};
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer};
 
-/// Pictures that are in sight: what one looks through.
+/// Number of pictures that are unfolded: as many as a reader looks through.
 const UNFOLDED: usize = 6;
-/// Pictures that are folded away: more make the page slow.
+/// Number of pictures that are folded away; more would make the page slow.
 const FOLDED: usize = 48;
 
-/// Room for tick labels, the same for both plots of a figure.
+/// Room for tick labels, the same for both plots of a figure, in SVG units.
 const GUTTER: f64 = 44.0;
 
 /// What the pictures show of the three models.
@@ -43,7 +43,7 @@ pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
         let mut traces: Vec<&SignalTrace> =
             t.signals.iter().filter(|s| s.episode == episode).collect();
         traces.sort_by_key(|s| order.iter().position(|o| *o == s.signal));
-        // A later episode is in sight only as a whole.
+        // A later episode is unfolded only as a whole.
         let open = match (i, traces.len() <= room) {
             (0, _) => traces.len().min(room),
             (_, true) => traces.len(),
@@ -122,7 +122,7 @@ fn by_gap(signals: &[SignalTrace]) -> Vec<&str> {
     gaps.into_iter().map(|g| g.0).collect()
 }
 
-/// Whether two simulations are not the same.
+/// Whether two simulations differ.
 fn differ(a: &[f64], b: &[f64]) -> bool {
     a.len() != b.len() || a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1e-12)
 }
@@ -174,7 +174,7 @@ fn figure(trace: &SignalTrace, shown: Shown) -> Figure {
     .beneath(residuals(trace, shown))
 }
 
-/// The axis of time, the same for both plots of a figure.
+/// The time axis, the same for both plots of a figure.
 fn times(label: &str, trace: &SignalTrace) -> Axis {
     let axis = Axis::new(label, if label.is_empty() { "" } else { "s" });
     match span(&trace.time) {
@@ -188,7 +188,7 @@ fn start(trace: &SignalTrace) -> f64 {
     trace.time.first().copied().unwrap_or(0.0)
 }
 
-/// The readings with the simulations over them, and the models that leave the picture.
+/// The readings with the simulations, and the models that leave the picture.
 fn readings(trace: &SignalTrace, shown: Shown) -> (Chart, Vec<&'static str>) {
     let models = [
         ("nominal", &trace.nominal, shown.nominal),
@@ -249,7 +249,7 @@ fn readings(trace: &SignalTrace, shown: Shown) -> (Chart, Vec<&'static str>) {
     (chart, left)
 }
 
-/// Residuals before and after.
+/// Residuals before and after identification.
 fn residuals(trace: &SignalTrace, shown: Shown) -> Chart {
     let before = trace.residuals(&trace.identified);
     let after = trace.residuals(&trace.refined);

@@ -1,4 +1,5 @@
-//! Faults of wiring, before everything else: what is wrong with the columns, and the lines that mend it.
+//! Wiring faults, shown before everything else: what is wrong with the columns, and the lines that
+//! correct it.
 
 use asid_results::diagnosis::DiagnosisResult;
 

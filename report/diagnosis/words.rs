@@ -1,4 +1,4 @@
-//! How sets of effects, probabilities and shares are told.
+//! Texts for sets of effects, probabilities and shares.
 
 use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult};
 use asid_results::naming::grouped;
@@ -6,12 +6,12 @@ use asid_results::trace::DiagnosisTrace;
 
 use crate::number::{NOT_A_NUMBER, Precision, decimals, quantity, round, significant};
 
-/// `a + b`, with the sites of one law together.
+/// `a + b`, with the sites of one law grouped.
 pub(super) fn set(effects: &[String]) -> String {
     grouped(effects).join(" + ")
 }
 
-/// A hypothesis by name, and what it says where that is not an effect's name.
+/// A hypothesis by name, with an explanation where it is not an effect's name.
 pub(super) fn hypothesis(hypothesis: &HypothesisResult) -> (String, &'static str) {
     match &hypothesis.effects[..] {
         [] => ("none".to_owned(), "no effect is missing"),
@@ -53,18 +53,18 @@ pub(super) fn percent(share: f64) -> String {
     }
 }
 
-/// What an effect is, as the catalogue has it; may be empty.
+/// The catalogue's description of an effect; may be empty.
 pub(super) fn about<'t>(trace: &'t DiagnosisTrace, effect: &EffectResult) -> &'t str {
     let known = trace.catalogue.get(&effect.effect);
     known.map_or("", |words| &*words.about)
 }
 
-/// Whether a unit is told in words: what it depends on, or what is meant by it.
+/// Whether a unit is described in words.
 fn is_in_words(unit: &str) -> bool {
     ["unit of", " or ", ","].iter().any(|w| unit.contains(w))
 }
 
-/// `place = 0.41 m`, or `place = 0.41 (0.38 to 0.44) m` where there is an interval.
+/// `place = 0.41 m`, or `place = 0.41 (0.38 to 0.44) m` with an interval.
 fn value(name: &str, value: f64, unit: &str, interval: Option<[f64; 2]>) -> String {
     let number = match interval.filter(|i| i.iter().all(|x| x.is_finite())) {
         Some([low, high]) => {
@@ -82,7 +82,7 @@ fn value(name: &str, value: f64, unit: &str, interval: Option<[f64; 2]>) -> Stri
     format!("{name} = {told}")
 }
 
-/// The fitted values of an effect; those that have no part in it are left out.
+/// The fitted values of an effect; values without influence are left out.
 pub fn values(trace: &DiagnosisTrace, effect: &EffectResult) -> String {
     let words = trace.catalogue.get(&effect.effect);
     let acting = effect.parameters.iter().filter_map(|(name, x)| {

@@ -1,4 +1,4 @@
-//! A plot with the title above it and the sentence below that helps to read it.
+//! A plot with a title above it and a caption below that explains how to read it.
 
 use crate::markup::escape;
 use crate::plot::{NARROW, Plot, WIDE};
@@ -20,7 +20,7 @@ impl std::fmt::Debug for Figure {
 }
 
 impl Figure {
-    /// A figure; `title` says what one sees, `caption` how to read it.
+    /// A figure; `title` says what it shows, `caption` how to read it.
     pub fn new(
         title: impl Into<String>,
         plot: impl Plot + Send + Sync + 'static,
@@ -33,14 +33,14 @@ impl Figure {
         }
     }
 
-    /// Adds a plot beneath those there are, under the same title.
+    /// Adds a plot beneath the existing ones, under the same title.
     #[must_use]
     pub fn beneath(mut self, plot: impl Plot + Send + Sync + 'static) -> Self {
         self.plots.push(Box::new(plot));
         self
     }
 
-    /// The figure; one with a row to itself carries a second layout for wide screens.
+    /// The figure as HTML; one with a row to itself has a second layout for wide screens.
     pub(super) fn html(&self, id: &str, alone: bool) -> String {
         let draw = |(i, plot): (usize, &(dyn Plot + Send + Sync))| {
             let (id, class) = match i {

@@ -1,4 +1,4 @@
-//! How near a figure is to its limit, small enough for a cell of a table.
+//! A gauge of a value relative to its limit, small enough for a table cell.
 
 use super::Tone;
 use crate::plot::{Scale, Spacing};
@@ -9,8 +9,8 @@ const SIZE: [f64; 2] = [112.0, 10.0];
 /// Shares of the limit at the two ends.
 const RANGE: [f64; 2] = [1e-6, 10.0];
 
-/// A bar on a logarithmic scale from a millionth of a limit to ten times of it, with
-/// a tick at the limit. What is nearer to zero is a ring at the left end.
+/// A bar on a logarithmic scale from a millionth of a limit to ten times the limit, with a tick at
+/// the limit. A smaller value is a ring at the left end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gauge {
     share: f64,
@@ -18,7 +18,7 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// A figure as a share of its limit: 1 is just within it.
+    /// A value as a share of its limit: 1 is just within it.
     #[must_use]
     pub fn new(share: f64, tone: Tone) -> Self {
         Self { share, tone }

@@ -1,4 +1,4 @@
-//! A titled part of a page and what can stand in it.
+//! A titled part of a page, and the blocks that it can contain.
 
 use asid_results::view::View;
 
@@ -45,7 +45,7 @@ impl Section {
         self
     }
 
-    /// Adds figures, two a row on a wide screen; an odd one out gets a row to itself.
+    /// Adds figures, two a row on a wide screen; the last of an odd number gets a row to itself.
     #[must_use]
     pub fn figures(mut self, figures: Vec<Figure>) -> Self {
         if !figures.is_empty() {
@@ -61,19 +61,19 @@ impl Section {
         self
     }
 
-    /// Adds the machine in 3-D.
+    /// Adds the 3-D view of the machine.
     #[must_use]
     pub fn view(mut self, view: View) -> Self {
         self.blocks.push(Block::View(Box::new(view)));
         self
     }
 
-    /// Whether the machine is to be seen in it.
+    /// Whether it contains a 3-D view.
     pub(super) fn has_view(&self) -> bool {
         self.blocks.iter().any(|b| matches!(b, Block::View(_)))
     }
 
-    /// Adds a remark, such as why something that a reader expects is not there.
+    /// Adds a remark, such as why an expected part is missing.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.blocks.push(Block::Note(note.into()));
@@ -87,7 +87,7 @@ impl Section {
         self
     }
 
-    /// Adds a list of names and what they are.
+    /// Adds a list of names and their values.
     #[must_use]
     pub fn facts(mut self, facts: Vec<(String, String)>) -> Self {
         if !facts.is_empty() {
@@ -103,7 +103,7 @@ impl Section {
         self
     }
 
-    /// Adds the body of another section, out of sight until its summary is clicked.
+    /// Adds the body of another section, hidden until its summary is clicked.
     #[must_use]
     pub fn folded(mut self, summary: impl Into<String>, inner: Self) -> Self {
         if !inner.blocks.is_empty() {
@@ -141,7 +141,8 @@ impl Section {
 }
 
 impl Block {
-    /// `figures` counts the figures of the section, for identifiers that are unique on the page.
+    /// The section as HTML; `figures` counts its figures, for identifiers that are unique on the
+    /// page.
     pub(super) fn html(&self, section: usize, figures: &mut usize) -> String {
         match self {
             Self::Figures(list) => {

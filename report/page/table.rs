@@ -1,20 +1,20 @@
-//! Tables that scroll inside their own frame where the screen is narrow.
+//! Tables that scroll inside their own frame on narrow screens.
 
 use super::{Gauge, Tone};
 use crate::markup::escape;
 
-/// What a column holds, which decides how it is set.
+/// Content of a column, which determines its typesetting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// A word or two, never broken.
     Text,
-    /// Numbers, flush right.
+    /// Numbers, right-aligned.
     Number,
-    /// Sentences, broken where they need to be.
+    /// Sentences, broken where necessary.
     Prose,
 }
 
-/// A column's head and what it holds.
+/// A column's head and the kind of its content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     title: String,
@@ -50,7 +50,7 @@ impl Column {
     }
 }
 
-/// A cell: formatted text, and how it is meant.
+/// A cell: formatted text and its tone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cell {
     text: String,
@@ -85,14 +85,14 @@ impl Cell {
         self
     }
 
-    /// Adds what is shown while the pointer rests on the cell.
+    /// Adds a tooltip.
     #[must_use]
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = hint.into();
         self
     }
 
-    /// What stands in the cell.
+    /// Content of the cell as HTML.
     fn html(&self) -> String {
         let gauge = self.gauge.as_ref().map_or_else(String::new, Gauge::html);
         let note = match &*self.note {
@@ -102,7 +102,7 @@ impl Cell {
         format!("{}{gauge}{note}", escape(&self.text))
     }
 
-    /// The attribute with what is shown on hover.
+    /// The attribute with the tooltip.
     fn title(&self) -> String {
         match &*self.hint {
             "" => String::new(),
@@ -117,7 +117,7 @@ impl<T: Into<String>> From<T> for Cell {
     }
 }
 
-/// A table. Rows shorter than the head are filled up with empty cells, longer ones cut.
+/// A table. Rows shorter than the head are padded with empty cells, longer ones are cut.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     columns: Vec<Column>,
@@ -145,14 +145,14 @@ impl Table {
         self
     }
 
-    /// Sets the last row apart as the sum of the others.
+    /// Marks the last row as the sum of the others.
     #[must_use]
     pub fn total(mut self) -> Self {
         self.total = true;
         self
     }
 
-    /// Sets the sentence above the table.
+    /// Sets the caption above the table.
     #[must_use]
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();

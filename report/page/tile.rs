@@ -30,7 +30,7 @@ impl Tile {
         self
     }
 
-    /// Says how the value is meant.
+    /// Sets the tone of the value.
     #[must_use]
     pub fn tone(mut self, tone: Tone) -> Self {
         self.tone = tone;

@@ -1,26 +1,27 @@
-//! The machine in 3-D: a canvas that plays an episode, and the scripts behind it.
+//! The machine in 3-D: a canvas that plays an episode, and its scripts.
 //!
-//! The data ([`View`]) stand in the page as JSON. The scripts draw them with WebGL 2, without any library and
-//! without fetching anything; they are files beside this one, put together into one script of the page:
+//! The page contains the data ([`View`]) as JSON. The scripts draw them with WebGL 2, without any
+//! library and without fetching anything. They are files beside this one, concatenated into one
+//! script of the page:
 //!
 //! | file | holds |
 //! |---|---|
 //! | `space.js` | vectors, quaternions, matrices |
 //! | `solids.js` | triangles of the shapes and arrows |
-//! | `replay.js` | the data, read; where every part is at a time |
+//! | `replay.js` | the parsed data; where every part is at a time |
 //! | `shaders.js` | what the graphics card computes |
 //! | `scene.js` | draws a moment |
 //! | `camera.js` | a camera that is turned by dragging |
 //! | `player.js` | slider, legend, episodes |
 //!
-//! Without scripts or WebGL 2 a sentence stands in its place; the plots show the same motions.
+//! Without scripts or WebGL 2 a sentence replaces it; the plots show the same motions.
 
 use asid_results::view::View;
 
 use super::Section;
 use crate::markup::escape;
 
-/// The scripts, in an order in which each uses only those before it when it is first run.
+/// The scripts, in an order in which each one's initial run uses only those before it.
 const SCRIPTS: [&str; 7] = [
     include_str!("view/space.js"),
     include_str!("view/solids.js"),
@@ -31,17 +32,17 @@ const SCRIPTS: [&str; 7] = [
     include_str!("view/player.js"),
 ];
 
-/// What stands in the place of the view where it cannot be drawn.
+/// Replacement text where the view cannot be drawn.
 const NOT_HERE: &str = "The machine in 3-D needs a browser that runs scripts and has WebGL 2. The plots show the same motions.";
 
-/// The scripts as one.
+/// The scripts, concatenated.
 pub(super) fn scripts() -> String {
     SCRIPTS.concat()
 }
 
-/// The place of a view on the page, with its data.
+/// The HTML of a view, with its data.
 pub(super) fn html(view: &View) -> String {
-    // No type of these can fail to be written. A name must not end the script or the page.
+    // Values of these types can always be serialised. A name must not end the script or the page.
     let data = serde_json::to_string(view).unwrap_or_default();
     let data = data
         .replace('&', "\\u0026")
@@ -54,7 +55,7 @@ pub(super) fn html(view: &View) -> String {
 }
 
 impl Section {
-    /// The machine in 3-D, with the remarks on it; `None` where there is nothing to see.
+    /// A section with the machine in 3-D and remarks on it; `None` where there is nothing to see.
     #[must_use]
     pub fn machine(view: Option<&View>, lead: &str) -> Option<Self> {
         let view = view.filter(|v| !v.takes.is_empty() && !v.shapes.is_empty())?;

@@ -29,7 +29,7 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// An empty chart whose title says what one sees.
+    /// An empty chart whose title says what it shows.
     #[must_use]
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
         Self {
@@ -43,7 +43,7 @@ impl Chart {
         }
     }
 
-    /// Adds a layer over those there are.
+    /// Adds a layer on top of the existing ones.
     #[must_use]
     pub fn layer(mut self, layer: Layer) -> Self {
         self.layers.push(layer);
@@ -57,15 +57,18 @@ impl Chart {
         self
     }
 
-    /// Sets the description read to those who cannot see the chart.
+    /// Sets the description for screen readers.
     #[must_use]
     pub fn description(mut self, description: impl Into<String>) -> Self {
         self.description = description.into();
         self
     }
 
-    /// Ties it to the 3-D view of an episode (`take`; empty for whichever is played), whose first row is at
-    /// `start` on its axis, s: a line shows the moment, a click goes to one.
+    /// Links it to the 3-D view of an episode: a line shows the current time, and a click moves to
+    /// a time.
+    ///
+    /// `take` is the episode, empty for the one being played; its first row is at `start` on the
+    /// chart's axis, s.
     #[must_use]
     pub fn clock(mut self, take: &str, start: f64) -> Self {
         self.clock = Some(Clock {
@@ -75,14 +78,14 @@ impl Chart {
         self
     }
 
-    /// Sets the height of the box that the data are drawn in, in SVG units.
+    /// Sets the height of the data box, in SVG units.
     #[must_use]
     pub fn height(mut self, height: f64) -> Self {
         self.height = height.max(40.0);
         self
     }
 
-    /// The domains of both axes: as fixed, or those of the data with a little room.
+    /// The domains of both axes: as fixed, or those of the data plus a margin.
     fn domains(&self) -> Option<[[f64; 2]; 2]> {
         let mut extent = Extent::default();
         for layer in &self.layers {
@@ -129,7 +132,8 @@ impl Chart {
         entries
     }
 
-    /// The labels above the plot. A span whose name would be wider than itself still gets one: lanes keep them apart.
+    /// The labels above the plot. A span narrower than its name still gets one, because lanes keep
+    /// labels apart.
     fn above(&self, [x_low, x_high]: [f64; 2]) -> Vec<Above> {
         self.layers
             .iter()
@@ -243,7 +247,7 @@ fn domain(axis: &Axis, data: [f64; 2], pad: f64) -> [f64; 2] {
         return [low / ratio, high * ratio];
     }
     let room = pad * (high - low);
-    // Data that stand on zero keep standing on the axis.
+    // Data that stand on zero remain on the axis.
     [
         if axis.zero && low == 0.0 {
             0.0
@@ -293,7 +297,7 @@ mod tests {
             .find_map(|n| n.attribute("d").filter(|d| d.contains('V')))
             .unwrap();
         let drawn: f64 = d[1..].split(' ').next().unwrap().parse().unwrap();
-        // Coordinates are rounded to a hundredth, those of the box as well.
+        // Coordinates are rounded to a hundredth, and so are those of the box.
         assert!(
             (drawn - scale.map(0.06)).abs() < 0.02,
             "{drawn} is not {}",

@@ -1,20 +1,20 @@
-//! What ties a plot over time to the 3-D view, and lets scripts read its drawing.
+//! Links a plot over time to the 3-D view, and lets scripts read its drawing.
 
 use super::coordinate;
 use crate::markup::escape;
 
-/// What ties a plot over time to the 3-D view: the episode, and when its time begins.
+/// Link of a plot over time to the 3-D view: the episode, and the start of its time.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Clock {
-    /// Episode; empty for whichever is played.
+    /// Episode; empty for the one being played.
     pub(super) take: String,
-    /// What the plot's axis reads at the episode's first row, s.
+    /// Value of the plot's axis at the episode's first row, s.
     pub(super) start: f64,
 }
 
 impl Clock {
-    /// Attributes of a plot whose axis of time spans `domain`, whose other one, `label`, spans `range`, and whose
-    /// box has these edges.
+    /// Attributes of a plot whose time axis spans `domain`, whose other axis, `label`, spans
+    /// `range`, and whose box has these edges.
     pub(super) fn attributes(
         &self,
         domain: [f64; 2],

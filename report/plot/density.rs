@@ -1,6 +1,6 @@
 //! Densities of weighted samples.
 
-/// Samples with weights; what is not finite or has no weight is dropped.
+/// Samples with weights; non-finite ones and those without weight are dropped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weighted {
     /// `(value, weight)` by increasing value; the weights sum to 1.
@@ -8,7 +8,7 @@ pub struct Weighted {
 }
 
 impl Weighted {
-    /// Equal weights where `weights` is empty; `None` where nothing usable is left.
+    /// Weights are equal if `weights` is empty; `None` if nothing usable is left.
     #[must_use]
     pub fn new(samples: &[f64], weights: &[f64]) -> Option<Self> {
         let weight = |i: usize| {
@@ -64,10 +64,11 @@ impl Weighted {
             .sqrt()
     }
 
-    /// Kernel density with Silverman's bandwidth (1986, eq. 3.31) at the effective number of samples.
+    /// Kernel density with Silverman's bandwidth (1986, eq. 3.31) at the effective number of
+    /// samples.
     ///
-    /// Mass that kernels would put outside of `bounds` is reflected back inside, so that a density that
-    /// ends at a bound of the prior is not drawn as if it faded there.
+    /// Kernel mass outside `bounds` is reflected back inside. A density that ends at a bound of the
+    /// prior is then not drawn as if it faded out there.
     #[must_use]
     pub fn density(&self, bounds: [f64; 2]) -> Density {
         let effective = 1.0 / self.sorted.iter().map(|s| s.1 * s.1).sum::<f64>();
@@ -102,7 +103,7 @@ pub struct Density {
 }
 
 impl Density {
-    /// The density at `x`; zero outside of the bounds.
+    /// The density at `x`; zero outside the bounds.
     #[must_use]
     pub fn at(&self, x: f64) -> f64 {
         let [low, high] = self.bounds;
@@ -128,7 +129,7 @@ impl Density {
     }
 }
 
-/// `count` evenly spaced values over `domain`, both ends included.
+/// `count` evenly spaced values over `domain`, including both ends.
 pub(crate) fn grid(domain: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
     let last = count.max(2) - 1;
     (0..=last).map(move |i| domain[0] + (domain[1] - domain[0]) * i as f64 / last as f64)

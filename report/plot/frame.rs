@@ -1,4 +1,4 @@
-//! Axes, grid and the box that data are drawn in, shared by all plots.
+//! Axes, grid and data box, shared by all plots.
 
 use super::header::{Above, Entry, layout};
 use super::scale::{Scale, Spacing, Ticks};
@@ -6,7 +6,7 @@ use super::{FONT_SIZE, coordinate};
 use crate::markup::{escape, fit, text_width};
 use crate::number::{superscript, unit_symbol};
 
-/// What an axis shows.
+/// Properties of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
     pub(crate) label: String,
@@ -30,7 +30,7 @@ impl Axis {
         }
     }
 
-    /// Fixes the domain; otherwise it is that of the data with a little room.
+    /// Fixes the domain; otherwise it is that of the data plus a margin.
     #[must_use]
     pub fn domain(mut self, domain: [f64; 2]) -> Self {
         self.domain = Some(domain);
@@ -44,28 +44,29 @@ impl Axis {
         self
     }
 
-    /// Spaces the axis by `spacing`.
+    /// Sets the spacing of the axis.
     #[must_use]
     pub fn spacing(mut self, spacing: Spacing) -> Self {
         self.spacing = spacing;
         self
     }
 
-    /// Leaves out tick labels: for an axis whose unit tells nothing, such as a density.
+    /// Omits tick labels, for an axis whose unit is uninformative, such as a density.
     #[must_use]
     pub fn bare(mut self) -> Self {
         self.bare = true;
         self
     }
 
-    /// Leaves at least this much room for tick labels, so that plots beneath each other line up.
+    /// Reserves at least this much room for tick labels, so that stacked plots line up.
     #[must_use]
     pub fn gutter(mut self, width: f64) -> Self {
         self.gutter = width;
         self
     }
 
-    /// Fixes what stands along the axis: `(position, text)`, increasing, such as the names of categories.
+    /// Sets the marks along the axis: `(position, text)`, increasing, such as the names of
+    /// categories.
     #[must_use]
     pub fn marks(mut self, marks: Vec<(f64, String)>) -> Self {
         self.marks = marks;
@@ -112,7 +113,7 @@ pub(crate) struct Frame {
     pub(crate) y: Scale,
     /// Grid, axes, labels, legend.
     pub(crate) svg: String,
-    /// Clip path of the box, to be referred to as `url(#{id}-clip)`.
+    /// Clip path of the box, referenced as `url(#{id}-clip)`.
     pub(crate) clip: String,
     pub(crate) width: f64,
     pub(crate) height: f64,
@@ -120,7 +121,7 @@ pub(crate) struct Frame {
     pub(crate) area: [f64; 4],
 }
 
-/// What a frame is laid out from.
+/// Input of a frame's layout.
 pub(crate) struct Request<'a> {
     pub(crate) id: &'a str,
     pub(crate) width: f64,
@@ -129,12 +130,12 @@ pub(crate) struct Request<'a> {
     pub(crate) entries: Vec<Entry>,
     /// Labels above the plot, `x` in data units.
     pub(crate) above: Vec<Above>,
-    /// Draw grid lines up from the x axis as well.
+    /// Whether to draw grid lines from the x axis as well.
     pub(crate) map_grid: bool,
 }
 
 impl Frame {
-    /// Space left of a box of `plot_height` for its y ticks, and right of it.
+    /// Space to the left of a box of `plot_height` for its y ticks, and to the right of it.
     pub(crate) fn margins(y: (&Axis, [f64; 2]), plot_height: f64) -> [f64; 2] {
         let ticks = y_ticks(y, [plot_height, 0.0], plot_height).1;
         let widest = ticks
@@ -203,7 +204,7 @@ impl Frame {
                 coordinate(at),
                 coordinate(bottom)
             ));
-            // Labels at the ends move inwards rather than out of the drawing.
+            // Move labels at the ends inwards rather than out of the drawing.
             let half = 0.5 * text_width(label, FONT_SIZE);
             svg.push_str(&format!(
                 "<text class=\"tick\" text-anchor=\"middle\" x=\"{}\" y=\"{}\">{}</text>",
@@ -252,7 +253,7 @@ fn y_ticks((axis, domain): (&Axis, [f64; 2]), range: [f64; 2], plot_height: f64)
     (scale, ticks)
 }
 
-/// As many ticks as stand apart by more than their own labels.
+/// As many ticks as fit without overlapping labels.
 pub(super) fn x_ticks(axis: &Axis, scale: &Scale, width: f64) -> Ticks {
     let mut most = (width / 55.0).floor().max(2.0) as usize;
     loop {

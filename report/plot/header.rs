@@ -1,8 +1,8 @@
 //! The rows above a plot: the y axis' label, the legend, and lanes for marker labels.
 //!
-//! Everything is placed by estimated text widths so that no two texts touch,
-//! whatever the data are: the legend flows into as many rows as it needs, and a
-//! marker label that would meet another one goes up a lane.
+//! Estimated text widths determine all positions, so that no two texts overlap, whatever the data.
+//! The legend flows into as many rows as it needs, and a marker label that would overlap another
+//! one moves up a lane.
 
 use super::{Colour, Dash, FONT_SIZE, coordinate};
 use crate::markup::{escape, fit, text_width};
@@ -11,18 +11,18 @@ use crate::markup::{escape, fit, text_width};
 const ROW: f64 = 19.0;
 /// Width of the sample of a line or mark, in SVG units.
 const KEY_WIDTH: f64 = 20.0;
-/// From the sample to its name, in SVG units.
+/// Distance from the sample to its name, in SVG units.
 const KEY_GAP: f64 = 6.0;
-/// From one item of the key to the next, in SVG units.
+/// Distance between two items of the key, in SVG units.
 const ITEM_GAP: f64 = 16.0;
-/// From a label to what it labels, in SVG units.
+/// Distance from a label to what it labels, in SVG units.
 const LABEL_GAP: f64 = 9.0;
 
 /// How a legend entry is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Key {
     Line(Dash),
-    /// A broad and faint line: its width and opacity.
+    /// A broad, faint line: its width and opacity.
     Broad(f64, f64),
     Fill(f64),
     Dot(f64),
@@ -38,7 +38,7 @@ pub(crate) struct Entry {
     pub(crate) text: String,
 }
 
-/// A label that wants to stand above `x`.
+/// A label to be placed above `x`.
 #[derive(Clone, Debug)]
 pub(crate) struct Above {
     pub(crate) x: f64,
@@ -56,7 +56,7 @@ pub(crate) struct Header {
 pub(crate) fn layout(width: f64, y_label: &str, entries: &[Entry], above: &[Above]) -> Header {
     let mut svg = String::new();
 
-    // Row of the y label, which the legend joins while it fits.
+    // The legend shares the y label's row if it fits.
     let y_label = fit(y_label, FONT_SIZE, width);
     let mut baseline = FONT_SIZE;
     let mut x = 0.0;
@@ -69,7 +69,7 @@ pub(crate) fn layout(width: f64, y_label: &str, entries: &[Entry], above: &[Abov
         x = text_width(&y_label, FONT_SIZE) + 1.4 * ITEM_GAP;
     }
     let mut at_row_start = x == 0.0;
-    // A legend that would break over rows anyway starts on a row of its own.
+    // A legend that needs several rows starts on a row of its own.
     let total: f64 = entries.iter().map(|e| item_width(&e.text)).sum::<f64>()
         + ITEM_GAP * entries.len().saturating_sub(1) as f64;
     if !entries.is_empty() && !at_row_start && x + total > width {
@@ -121,7 +121,7 @@ fn item_width(text: &str) -> f64 {
     KEY_WIDTH + KEY_GAP + text_width(text, FONT_SIZE)
 }
 
-/// A marker label with its place: left edge, right edge, lane from the plot upwards.
+/// A marker label with its position: left edge, right edge, lane counted upwards from the plot.
 #[derive(Debug)]
 struct Placed {
     text: String,
@@ -143,7 +143,7 @@ fn lanes(width: f64, above: &[Above]) -> Vec<Placed> {
         let wide = text_width(&text, FONT_SIZE);
         let left = (label.x - 0.5 * wide).clamp(0.0, (width - wide).max(0.0));
         let right = left + wide;
-        // The lowest lane in which nothing is met.
+        // Take the lowest lane without an overlap.
         let lane = (0..)
             .find(|&lane| {
                 placed

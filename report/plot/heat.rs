@@ -1,19 +1,20 @@
-//! A square table of shaded cells: how alike things are, pair by pair.
+//! A square table of shaded cells: pairwise similarity.
 
 use super::header::layout;
 use super::{Colour, FONT_SIZE, Plot, coordinate, root};
 use crate::markup::{escape, fit, text_width};
 
-/// Largest side of a cell, SVG units: a table of two is no poster.
+/// Largest side of a cell, SVG units, so that a table of two stays small.
 const LARGEST: f64 = 44.0;
-/// Smallest side of a cell, SVG units: finger-wide rows of text beside it still stand apart.
+/// Smallest side of a cell, SVG units: rows of text beside it still do not overlap.
 const SMALLEST: f64 = 17.0;
 /// Largest share of the width that names take.
 const NAMES: f64 = 0.42;
-/// Opacity of a cell from which on its text is the paper's colour.
+/// Opacity of a cell above which its text has the paper's colour.
 const DARK: f64 = 0.55;
 
-/// A table with a row and a column for each name. Rows carry number and name, columns the number.
+/// A table with a row and a column for each name. Rows carry number and name, columns only the
+/// number.
 #[derive(Clone, Debug)]
 pub struct Heat {
     title: String,
@@ -24,7 +25,8 @@ pub struct Heat {
 }
 
 impl Heat {
-    /// Cells of `shades` (0 to 1, one row a name; what is not finite stays empty) with `texts` in them where all fit.
+    /// Cells with `shades` (0 to 1, one row a name; non-finite ones stay empty), and with `texts`
+    /// in them if all fit.
     #[must_use]
     pub fn new(
         title: &str,
@@ -41,7 +43,7 @@ impl Heat {
         }
     }
 
-    /// Sets the description read to those who cannot see the plot.
+    /// Sets the description for screen readers.
     #[must_use]
     pub fn description(mut self, description: impl Into<String>) -> Self {
         self.description = description.into();
@@ -79,7 +81,7 @@ impl Plot for Heat {
         let room = longest.min(NAMES * width);
         let left = room + 12.0;
         let side = ((width - left - 2.0) / n.max(1) as f64).clamp(1.0, LARGEST);
-        // On a narrow page cells are lower than rows of text and become taller than wide.
+        // On a narrow page cells are lower than rows of text, so they become taller than wide.
         let height = side.max(SMALLEST);
         let header = layout(width, "", &[], &[]);
         let top = header.height + 20.0;

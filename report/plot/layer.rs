@@ -1,8 +1,8 @@
-//! What a chart is made of: one layer a series, drawn in the order given.
+//! The layers of a chart: one for each series, drawn in the order given.
 
 use super::Colour;
 
-/// How a line is broken.
+/// Dash pattern of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Dash {
     /// Unbroken.
@@ -27,7 +27,7 @@ impl Dash {
 /// The geometry of a layer, in data units.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Mark {
-    /// Connected points `[x, y]`, interrupted where one is not finite.
+    /// Connected points `[x, y]`, interrupted at non-finite ones.
     Line(Vec<[f64; 2]>),
     /// Like a line, but each value holds until the next point.
     Steps(Vec<[f64; 2]>),
@@ -113,7 +113,7 @@ impl Layer {
         Self::new(Mark::Whiskers(points)).opacity(0.45)
     }
 
-    /// Bars `[x0, x1, y]` that stand on zero.
+    /// Bars `[x0, x1, y]` that start at zero.
     #[must_use]
     pub fn bars(bars: Vec<[f64; 3]>) -> Self {
         Self::new(Mark::Bars(bars)).opacity(0.8)
@@ -131,7 +131,7 @@ impl Layer {
         Self::new(Mark::Horizontal(y))
     }
 
-    /// A shaded stretch of the x axis, its name above the plot.
+    /// A shaded range of the x axis, with its name above the plot.
     #[must_use]
     pub fn span(x0: f64, x1: f64, name: &str) -> Self {
         Self::new(Mark::Span(x0, x1, name.to_owned()))
@@ -181,7 +181,7 @@ impl Layer {
         self
     }
 
-    /// The attribute that draws lines at a width of their own.
+    /// The attribute for a line width that differs from the default.
     pub(crate) fn width_style(&self) -> String {
         self.width.map_or_else(String::new, |width| {
             format!(
@@ -200,7 +200,8 @@ impl Layer {
         self
     }
 
-    /// Extent `[[x_low, x_high], [y_low, y_high]]` of the finite data; infinite and inverted where there is none.
+    /// Extent `[[x_low, x_high], [y_low, y_high]]` of the finite data; infinite and inverted if
+    /// there are none.
     pub(crate) fn extent(&self) -> [[f64; 2]; 2] {
         let mut extent = Extent::default();
         match &self.mark {

@@ -1,11 +1,11 @@
-//! Layers of a chart as SVG elements, without the points that are not finite.
+//! Layers of a chart as SVG elements, without non-finite points.
 
 use super::coordinate;
 use super::frame::Frame;
 use super::layer::{Layer, Mark};
 use crate::markup::escape;
 
-/// Points a line is thinned to; a plot has fewer pixels than this.
+/// Number of points to which a line is thinned; a plot has fewer pixels than this.
 const MOST_POINTS: usize = 900;
 
 /// The layer inside the frame's box, as SVG.
@@ -16,7 +16,7 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
     let zero = y.map_clamped(0.0);
     let opacity = coordinate(layer.opacity);
     let at = |p: &[f64; 2]| [x.map(p[0]), y.map(p[1])];
-    // What the legend calls it, for whoever points at it.
+    // The legend's name, for the tooltip.
     let name = (layer.label.as_deref()).map_or_else(String::new, |label| {
         format!(" data-name=\"{}\"", escape(label))
     });
@@ -87,7 +87,7 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
         )),
         Mark::Span(x0, x1, _) if x0.is_finite() && x1.is_finite() => {
             let (a, b) = (x.map_clamped(x0.min(*x1)), x.map_clamped(x0.max(*x1)));
-            // A hair's breadth between neighbours shows where one ends.
+            // A thin gap between neighbours shows where one ends.
             fill(&format!(
                 "M{} {}V{}H{}V{}Z",
                 coordinate(a + 0.5),
@@ -105,7 +105,7 @@ fn is_finite(place: &[f64; 3]) -> bool {
     place.iter().all(|c| c.is_finite())
 }
 
-/// Circles about some places.
+/// Circles at some positions.
 fn dots(places: impl Iterator<Item = [f64; 2]>, radius: f64) -> String {
     let seen = places.filter(|p| p.iter().all(|c| c.is_finite()));
     seen.map(|[cx, cy]| {
@@ -128,7 +128,7 @@ fn whiskers(places: impl Iterator<Item = [f64; 3]>) -> String {
     places.filter(is_finite).map(stroke).collect()
 }
 
-/// A path of rectangles that stand on `zero`: from one `x` to another, up to `y`.
+/// A path of rectangles based on `zero`: from one `x` to another, up to `y`.
 fn rectangles(places: impl Iterator<Item = [f64; 3]>, zero: f64) -> String {
     let rectangle = |[x0, x1, y1]: [f64; 3]| {
         let gap = if (x1 - x0).abs() > 4.0 { 0.6 } else { 0.0 };
@@ -144,7 +144,7 @@ fn rectangles(places: impl Iterator<Item = [f64; 3]>, zero: f64) -> String {
     places.filter(is_finite).map(rectangle).collect()
 }
 
-/// An SVG path through `points`, interrupted where one is not finite.
+/// An SVG path through `points`, interrupted at non-finite ones.
 pub(super) fn path(points: &[[f64; 2]]) -> String {
     let mut d = String::new();
     let mut pen_down = false;
@@ -164,7 +164,7 @@ pub(super) fn path(points: &[[f64; 2]]) -> String {
     d
 }
 
-/// Closed shapes between `[x, y0]` and `[x, y1]`, one a stretch of finite points.
+/// Closed shapes between `[x, y0]` and `[x, y1]`, one for each stretch of finite points.
 fn ribbon(edges: &[[f64; 3]]) -> String {
     edges
         .split(|e| e.iter().any(|c| !c.is_finite()))
@@ -177,7 +177,8 @@ fn ribbon(edges: &[[f64; 3]]) -> String {
         .collect()
 }
 
-/// Keeps first, lowest, highest and last of each stretch of a long line, which draws the same at this size.
+/// Keeps first, lowest, highest and last of each stretch of a long line, which looks the same at
+/// this size.
 fn thin(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     if points.len() <= MOST_POINTS {
         return points;

@@ -12,7 +12,7 @@ pub struct Outline {
     pub(super) circle: Option<f64>,
     pub(super) closed: bool,
     pub(super) dots: bool,
-    /// Dots grow from faint to strong.
+    /// Whether dots grow from faint to strong.
     pub(super) fade: bool,
     pub(super) colour: Colour,
     pub(super) dash: Dash,
@@ -75,7 +75,7 @@ impl Outline {
         }
     }
 
-    /// Dots that are all alike.
+    /// Dots of equal size.
     #[must_use]
     pub fn spots(points: Vec<[f64; 2]>) -> Self {
         Self {
@@ -92,7 +92,7 @@ impl Outline {
         self
     }
 
-    /// Sets the opacities of filling and outline, 0 to 1.
+    /// Sets the opacities of fill and outline, 0 to 1.
     #[must_use]
     pub fn strength(mut self, fill: f64, stroke: f64) -> Self {
         (self.fill, self.stroke) = (fill.clamp(0.0, 1.0), stroke.clamp(0.0, 1.0));
@@ -113,14 +113,14 @@ impl Outline {
         self
     }
 
-    /// Names a whole series of ghosts in the legend, from faint to strong.
+    /// Labels a whole series of ghosts in the legend, from faint to strong.
     #[must_use]
     pub fn series_label(mut self, label: impl Into<String>) -> Self {
         self.label = Some((label.into(), true));
         self
     }
 
-    /// Draws the shape where it is in view, but lets it not widen the view.
+    /// Draws the shape where it is in view, without widening the view for it.
     #[must_use]
     pub fn context(mut self) -> Self {
         self.context = true;

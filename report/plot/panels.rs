@@ -1,4 +1,4 @@
-//! Plots side by side as one SVG file that stands alone: for a page of documentation.
+//! Plots side by side as one standalone SVG file, for a page of documentation.
 
 use crate::markup::escape;
 use crate::style::STYLE;
@@ -18,7 +18,7 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// No panels yet; `columns` of them make a row.
+    /// An empty grid with `columns` panels a row.
     #[must_use]
     pub fn new(columns: usize) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Panels {
                     coordinate(NARROW),
                     coordinate(height)
                 );
-                // The class is the group's: its width is of pages, not of files.
+                // Move the class to the group: its width applies to pages, not to files.
                 let nested = svg
                     .replacen("<svg ", &place, 1)
                     .replacen("class=\"plot\" ", "", 1);
@@ -81,7 +81,7 @@ impl Panels {
     }
 }
 
-/// Height of an SVG element by its view box.
+/// Height of an SVG element, from its view box.
 fn height(svg: &str) -> Option<f64> {
     let (_, rest) = svg.split_once("viewBox=\"")?;
     rest.split('"').next()?.split(' ').nth(3)?.parse().ok()

@@ -32,28 +32,28 @@ impl Plan {
         }
     }
 
-    /// Adds a shape over those there are.
+    /// Adds a shape on top of the existing ones.
     #[must_use]
     pub fn outline(mut self, outline: Outline) -> Self {
         self.outlines.push(outline);
         self
     }
 
-    /// Sets the description read to those who cannot see the plan.
+    /// Sets the description for screen readers.
     #[must_use]
     pub fn description(mut self, description: impl Into<String>) -> Self {
         self.description = description.into();
         self
     }
 
-    /// Keeps the view from reaching below `y`: the floor of a side view.
+    /// Prevents the view from extending below `y`: the floor of a side view.
     #[must_use]
     pub fn floor(mut self, y: f64) -> Self {
         self.floor = Some(y);
         self
     }
 
-    /// The part of the plane to show, or `None` where there is nothing.
+    /// The part of the plane to show; `None` where there is nothing.
     fn view(&self) -> Option<Extent> {
         let mut extent = Extent::default();
         self.outlines
@@ -76,7 +76,7 @@ impl Plan {
         Some(extent)
     }
 
-    /// Legend of what is in view.
+    /// Legend of the visible shapes.
     fn entries(&self, view: &Extent) -> Vec<Entry> {
         let entry = |o: &Outline| {
             let (text, series) = o.label.clone()?;
@@ -108,15 +108,16 @@ impl Plot for Plan {
             y: [0.0, 1.0],
         });
 
-        // The box's height follows from equal scales. Where that would be too
-        // flat or too tall, the shorter side shows more of the plane.
+        // Equal scales determine the box's height. If it would be too flat or too tall, the shorter
+        // side shows more of the plane.
         let limits = if width > NARROW * 1.5 {
             [0.28, 0.55]
         } else {
             [0.38, 0.95]
         };
         let mut plot_height = limits[1] * width;
-        // The tick labels' width depends on the height, and the height on it: twice settles it.
+        // The width of the tick labels depends on the height, and the height on that width: two
+        // iterations suffice.
         for _ in 0..2 {
             let [left, right] = Frame::margins((&self.y, extent.y), plot_height);
             let across = width - left - right;
@@ -167,7 +168,7 @@ impl Plot for Plan {
     }
 }
 
-/// Grows `interval` about its middle, or up from a floor it stands on, to `size`.
+/// Grows `interval` to `size` about its middle, or upwards from a floor on which it stands.
 fn widen(interval: &mut [f64; 2], size: f64, floor: Option<f64>) {
     let missing = size - (interval[1] - interval[0]);
     if missing <= 0.0 {

@@ -1,4 +1,4 @@
-//! Bars with their names beside them, or above them where the page is narrow.
+//! Bars with their names beside them, or above them on a narrow page.
 
 use super::frame::{Axis, x_ticks};
 use super::header::{Above, layout};
@@ -89,7 +89,7 @@ impl Ranking {
         }
     }
 
-    /// Sets the value that bars start from, instead of zero: a logarithmic axis needs one.
+    /// Sets the value at which bars start, instead of zero; a logarithmic axis needs one.
     #[must_use]
     pub fn base(mut self, base: f64) -> Self {
         self.base = base;
@@ -103,7 +103,7 @@ impl Ranking {
         self
     }
 
-    /// Adds a bar beneath those there are.
+    /// Adds a bar beneath the existing ones.
     #[must_use]
     pub fn row(mut self, row: Ranked) -> Self {
         self.rows.push(row);
@@ -117,14 +117,14 @@ impl Ranking {
         self
     }
 
-    /// Sets the description read to those who cannot see the plot.
+    /// Sets the description for screen readers.
     #[must_use]
     pub fn description(mut self, description: impl Into<String>) -> Self {
         self.description = description.into();
         self
     }
 
-    /// As the axis says, or that of the base, the references and the values.
+    /// The axis' own domain, or that of the base, the references and the values.
     fn domain(&self) -> [f64; 2] {
         if let Some(fixed) = self.axis.domain {
             return fixed;
@@ -140,7 +140,7 @@ impl Ranking {
     }
 }
 
-/// Where the parts of a row stand.
+/// Positions of the parts of a row.
 struct Places {
     scale: Scale,
     left: f64,
@@ -196,7 +196,7 @@ impl Places {
         if !end.is_finite() {
             end = start;
         } else if row.value != self.base {
-            // Never thinner than what can be seen.
+            // Keep the bar thick enough to be visible.
             let (from, to) = (start.min(end), start.max(end).max(start.min(end) + 1.5));
             svg.push_str(&format!(
                 "<rect class=\"fill {}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{BAR}\" rx=\"1.5\" fill-opacity=\"0.85\"/>",
@@ -260,7 +260,7 @@ impl Plot for Ranking {
             bottom += 2.5 * LINE;
         }
 
-        // Grid and ticks, the lines of reference over them, the bars over both.
+        // Draw grid and ticks first, then the reference lines, then the bars.
         let vertical = |class: &str, at: f64| {
             format!(
                 "<path class=\"{class}\" d=\"M{} {}V{}\"/>",

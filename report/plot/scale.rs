@@ -1,14 +1,14 @@
-//! From data to drawing, and the round numbers on the way.
+//! Scales from data to drawing, and round numbers for ticks.
 
 use crate::number;
 
-/// How an axis is spaced.
+/// Spacing of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Spacing {
     /// Equal steps.
     #[default]
     Linear,
-    /// Equal ratios; needs a positive domain and falls back to linear without one.
+    /// Equal ratios; needs a positive domain, without which it falls back to linear.
     Log,
 }
 
@@ -20,19 +20,19 @@ pub struct Scale {
     spacing: Spacing,
 }
 
-/// Ticks of an axis: where, what they read, and a power of ten taken out of all of them.
+/// Ticks of an axis: positions, labels, and a common power of ten.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ticks {
     /// Positions in data units, increasing.
     pub values: Vec<f64>,
-    /// What each reads, after division by `10^exponent`.
+    /// Label of each, after division by `10^exponent`.
     pub labels: Vec<String>,
-    /// The common power of ten, a multiple of three; 0 where none is needed.
+    /// The common power of ten, a multiple of three; 0 if none is needed.
     pub exponent: i32,
 }
 
 impl Scale {
-    /// A scale over `domain`, which is put right where it is empty, upside down or not finite.
+    /// A scale over `domain`, which is corrected if it is empty, reversed or not finite.
     #[must_use]
     pub fn new(domain: [f64; 2], range: [f64; 2], spacing: Spacing) -> Self {
         let [mut low, mut high] = domain;
@@ -43,7 +43,7 @@ impl Scale {
             [low, high] = [high, low];
         }
         let spacing = if low > 0.0 { spacing } else { Spacing::Linear };
-        // A domain narrower than what doubles resolve has no ticks.
+        // A domain narrower than the resolution of doubles has no ticks.
         if high - low <= 1e-12 * low.abs().max(high.abs()) || high == low {
             let pad = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
             [low, high] = [low - pad, high + pad];
@@ -61,7 +61,7 @@ impl Scale {
         self.domain
     }
 
-    /// Where `value` is drawn. Not finite where `value` has no place.
+    /// Position of `value` in the drawing; not finite if `value` cannot be represented.
     #[must_use]
     pub fn map(&self, value: f64) -> f64 {
         let [low, high] = self.domain;
@@ -73,19 +73,19 @@ impl Scale {
         self.range[0] + share * (self.range[1] - self.range[0])
     }
 
-    /// `value` drawn, moved to the nearer end where it lies outside of the domain.
+    /// Position of `value`, moved to the nearer end if it lies outside the domain.
     #[must_use]
     pub fn map_clamped(&self, value: f64) -> f64 {
         self.map(value.clamp(self.domain[0], self.domain[1]))
     }
 
-    /// At most `most` ticks (at least two are tried for) on round numbers inside the domain.
+    /// At most `most` ticks on round numbers inside the domain; it aims for at least two.
     #[must_use]
     pub fn ticks(&self, most: usize) -> Ticks {
         if self.spacing == Spacing::Log {
             let values = log_ticks(self.domain, most.max(2));
             if values.len() >= 2 {
-                // One style for all: plain numbers where all are short.
+                // Use one style for all: plain numbers if all are short.
                 let plain = values.iter().all(|v| (0.999e-3..1.001e4).contains(v));
                 let labels = values
                     .iter()
@@ -111,7 +111,7 @@ impl Scale {
 /// Ticks at 1, 2 or 5 times a power of ten.
 fn linear_ticks([low, high]: [f64; 2], most: usize) -> Ticks {
     let mut magnitude = ((high - low) / most as f64).log10().floor() as i32;
-    // The finest step of the 1-2-5 series that gives at most `most` ticks.
+    // Find the finest step of the 1-2-5 series that gives at most `most` ticks.
     let (step, first, last) = 'found: loop {
         for factor in [1.0, 2.0, 5.0] {
             let step = factor * 10f64.powi(magnitude);
@@ -125,7 +125,7 @@ fn linear_ticks([low, high]: [f64; 2], most: usize) -> Ticks {
     let count = (last - first + 1.0).max(0.0) as usize;
     let values: Vec<f64> = (0..count).map(|i| (first + i as f64) * step).collect();
 
-    // Long labels share a power of ten, in steps of a thousand as units do.
+    // Long labels share a power of ten, in steps of a thousand like units.
     let largest = low.abs().max(high.abs());
     let digits_of_largest = largest.log10().floor() as i32;
     let exponent = if !(-3..5).contains(&digits_of_largest) || magnitude < -4 {
@@ -145,7 +145,7 @@ fn linear_ticks([low, high]: [f64; 2], most: usize) -> Ticks {
     }
 }
 
-/// Ticks on decades, with their double and fivefold where there are few decades.
+/// Ticks on decades, with 2 and 5 times these if there are few decades.
 fn log_ticks([low, high]: [f64; 2], most: usize) -> Vec<f64> {
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
     let decades = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
@@ -203,7 +203,7 @@ mod tests {
                 for pair in ticks.values.windows(3) {
                     assert!(((pair[2] - pair[1]) - (pair[1] - pair[0])).abs() < slack);
                 }
-                // Each label reads as another number than its neighbour.
+                // Neighbouring labels show different numbers.
                 assert!(
                     ticks.labels.windows(2).all(|pair| pair[0] != pair[1]),
                     "{ticks:?}"

@@ -1,4 +1,4 @@
-//! The task itself: the metric over time, how the action was found, and the end of it.
+//! The task itself: the metric over time, how the action was found, and the final state.
 
 use std::collections::BTreeMap;
 
@@ -76,7 +76,7 @@ fn over_time(d: &Downstream) -> Figure {
         .collect();
     let title = format!("{name} over the task");
     let spans = d.phases.iter().enumerate().map(|(i, phase)| {
-        // Neighbours differ in shade.
+        // Alternate the shade of neighbouring phases.
         Layer::span(phase.start, phase.end, &phase.name).opacity(if i % 2 == 0 {
             0.07
         } else {
@@ -185,7 +185,7 @@ fn tried(search: &Search, dimension: usize) -> Figure {
     Figure::new(title, chart.description(caption.clone()), caption)
 }
 
-/// A tenth of the spread of the actions tried: how finely the chosen one needs to be told.
+/// A tenth of the spread of the tried actions: the precision needed for the chosen one.
 fn spread(search: &Search, dimension: usize) -> Option<f64> {
     let values: Vec<f64> = search
         .trials

@@ -127,7 +127,7 @@ pub(super) fn outline_of(shape: &Shape) -> Outline {
     }
 }
 
-/// Name of an object, for people.
+/// Display name of an object.
 fn name_of(track: &ObjectTrack) -> &str {
     if track.name.is_empty() {
         "object"
@@ -136,7 +136,7 @@ fn name_of(track: &ObjectTrack) -> &str {
     }
 }
 
-/// Outlines of an object at evenly spread times, faint to strong.
+/// Outlines of an object at evenly spaced times, faint to strong.
 fn ghosts(track: &ObjectTrack, colour: Colour) -> Vec<Outline> {
     let poses: Vec<&[f64; 3]> = track
         .poses
@@ -189,7 +189,7 @@ fn span(name: &str, time: &[f64]) -> String {
     }
 }
 
-/// `by 0.12 m and turned by 34°`; of a round thing the way alone.
+/// `by 0.12 m and turned by 34°`; for a round object only the distance.
 fn displacement(track: &ObjectTrack) -> String {
     let mut poses = track
         .poses
@@ -212,7 +212,7 @@ fn displacement(track: &ObjectTrack) -> String {
 mod tests {
     use super::*;
 
-    /// Domain randomisation and the oracle explore nothing.
+    /// Domain randomisation and the oracle do not explore.
     #[test]
     fn a_run_without_an_explorer_says_so() {
         let report = RunReport::default();

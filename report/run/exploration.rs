@@ -1,4 +1,4 @@
-//! What the exploration gathered, and how the explorer got there.
+//! What the exploration gathered, and how its policy was found.
 
 use super::trace::{ExpectedStd, Exploration, LearningCurve, RunReport};
 use crate::number::{decimals, quantity, significant};
@@ -117,7 +117,7 @@ fn gained(exploration: &Exploration) -> Figure {
     )
 }
 
-/// Bars `[start, end, value]` from the times at the ends of the steps.
+/// Bars `[start, end, value]` from the end times of the steps.
 fn step_bars(time: &[f64], value: &[f64]) -> Vec<[f64; 3]> {
     let first = match time {
         [a, b, ..] => a - (b - a),

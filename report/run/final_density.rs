@@ -10,7 +10,8 @@ use crate::plot::{Axis, Chart, Colour, Layer, Weighted, grid};
 /// Share of the prior's range below which the density is drawn in close-up.
 const CLOSE_UP: f64 = 0.5;
 
-/// The density of one parameter, with prior, interval, estimate and truth; `None` where nothing is known of it.
+/// The density of one parameter, with prior, interval, estimate and truth; `None` if nothing is
+/// known of it.
 pub(super) fn figure(p: &ParameterReport) -> Option<Figure> {
     let title = format!("Posterior of {}", p.name);
     if let Some(Prior::Binary { probability }) = p.prior {
@@ -20,7 +21,8 @@ pub(super) fn figure(p: &ParameterReport) -> Option<Figure> {
             "Probability of the values 0 and 1: prior and posterior.",
         ));
     }
-    // All that follows happens on the axis' own scale: `u` is the logarithm for a parameter drawn on a log axis.
+    // Everything below uses the axis' own scale: `u` is the logarithm for a parameter drawn on a
+    // log axis.
     let axis = Scaled::of(p);
     let range = range(p).map(|r| r.map(|x| axis.from(x)));
     let samples: Vec<f64> = p.samples.iter().map(|&x| axis.from(x)).collect();
@@ -94,7 +96,7 @@ pub(super) fn figure(p: &ParameterReport) -> Option<Figure> {
     ))
 }
 
-/// The scale that a parameter's axis is drawn on.
+/// The scale of a parameter's axis.
 #[derive(Clone, Copy, Debug)]
 struct Scaled {
     log: bool,
@@ -108,7 +110,7 @@ impl Scaled {
         }
     }
 
-    /// From the parameter to the axis; NaN where it has no place there.
+    /// Converts from the parameter to the axis; NaN for a value that the axis cannot represent.
     fn from(self, x: f64) -> f64 {
         if self.log { x.ln() } else { x }
     }
@@ -117,7 +119,7 @@ impl Scaled {
         if self.log { u.exp() } else { u }
     }
 
-    /// `dx / du`: what a density is multiplied with.
+    /// `dx / du`: the factor that converts a density.
     fn stretch(self, u: f64) -> f64 {
         if self.log { u.exp() } else { 1.0 }
     }
@@ -128,7 +130,7 @@ impl Scaled {
     }
 }
 
-/// `domain` and `range` as on the axis.
+/// The caption; `domain` and `range` are on the axis' scale.
 fn caption(p: &ParameterReport, domain: [f64; 2], range: Option<[f64; 2]>) -> String {
     let mut text = match interval(p) {
         Some(interval) => format!("95 % interval {}", quantity(&interval, &p.unit)),
@@ -161,7 +163,8 @@ fn range(p: &ParameterReport) -> Option<[f64; 2]> {
     (range[0].is_finite() && range[1].is_finite() && range[0] < range[1]).then_some(range)
 }
 
-/// What the density is drawn over: the prior's range, or a close-up where the posterior fills little of it.
+/// The domain of the density: the prior's range, or a close-up where the posterior fills little of
+/// it.
 fn domain(
     p: &ParameterReport,
     axis: Scaled,
@@ -190,7 +193,7 @@ fn domain(
             close[0].min(u - 0.15 * reach),
             close[1].max(u + 0.15 * reach),
         ];
-        // A truth out of the prior's range stays in view.
+        // Keep a truth outside the prior's range in view.
         held = [held[0].min(u), held[1].max(u)];
     }
     match range {
@@ -205,7 +208,7 @@ fn prior_density(prior: &Prior, x: f64) -> f64 {
         Prior::LogUniform { low, high } if low > 0.0 && (low..=high).contains(&x) => {
             1.0 / (x * (high / low).ln())
         }
-        // The mass beyond the cut is not given back: the line is a guide, not a measure.
+        // The truncated density is not renormalised: the line is a guide, not a measure.
         Prior::Normal {
             mean,
             std,
@@ -220,7 +223,7 @@ fn gaussian(x: f64, mean: f64, std: f64) -> f64 {
     (-0.5 * ((x - mean) / std).powi(2)).exp() / (std * (2.0 * std::f64::consts::PI).sqrt())
 }
 
-/// Two pairs of bars for a parameter that is either 0 or 1.
+/// Two pairs of bars for a binary parameter.
 fn binary(p: &ParameterReport, prior: f64) -> Option<Chart> {
     let after = match Weighted::new(&p.samples, &p.weights) {
         Some(weighted) => weighted.mean(),

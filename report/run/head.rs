@@ -122,7 +122,7 @@ fn answer(report: &RunReport) -> String {
     }
 }
 
-/// How finely all numbers of a parameter are told.
+/// Precision of all numbers of a parameter.
 pub(super) fn precision(p: &ParameterReport) -> Precision {
     Precision::of(p.estimate, p.std)
 }
@@ -147,7 +147,7 @@ pub(super) fn covered(p: &ParameterReport) -> Option<bool> {
     Some((low..=high).contains(&truth))
 }
 
-/// What the metric is called in a sentence: its label, or its name without the unit and underscores.
+/// The metric's name in a sentence: its label, or its name without the unit and underscores.
 pub(super) fn metric_name(d: &Downstream) -> String {
     if !d.label.is_empty() {
         return d.label.clone();
@@ -164,7 +164,7 @@ pub(super) fn metric_name(d: &Downstream) -> String {
 }
 
 pub(super) fn metric_value(d: &Downstream) -> String {
-    // Small next to its limit, a metric needs no third digit.
+    // A metric far below its limit needs no third digit.
     let number = match d.threshold {
         Some(limit) if limit.is_finite() && limit > 0.0 && d.value.is_finite() => {
             let places = (1.0 - limit.log10().floor()).clamp(0.0, 6.0);

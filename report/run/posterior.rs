@@ -1,4 +1,4 @@
-//! How the posterior narrowed, and what it is in the end.
+//! How the posterior narrowed, and its final form.
 
 use super::final_density;
 use super::trace::{ParameterReport, Prior, RunReport};
@@ -45,7 +45,7 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     Some(notes.into_iter().fold(section, Section::note))
 }
 
-/// How a parameter's axis is spaced.
+/// Spacing of a parameter's axis.
 pub(super) fn spacing(p: &ParameterReport) -> Spacing {
     if p.log_scale {
         Spacing::Log

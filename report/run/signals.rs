@@ -127,7 +127,7 @@ fn caption(signal: &Signal) -> String {
     text
 }
 
-/// Root mean square of reading minus replay over the readings that the replay covers.
+/// Root mean square of reading minus replay, over the readings that the replay covers.
 fn residual(signal: &Signal, replay: &Replay) -> Option<f64> {
     let squares: Vec<f64> = signal
         .time
@@ -149,7 +149,7 @@ fn interpolate(replay: &Replay, t: f64) -> Option<f64> {
             let share = (t - time[before]) / (after - time[before]);
             Some(replay.value[before] + share * (replay.value[next] - replay.value[before]))
         }
-        // Clocks that differ by rounding only still meet at the end.
+        // Clocks that differ only by rounding still meet at the end.
         (Some(last), None) if t - time[last] < 1e-6 => Some(replay.value[last]),
         _ => None,
     }

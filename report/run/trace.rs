@@ -23,8 +23,8 @@ pub const SCHEMA: u32 = 1;
 pub struct RunReport {
     /// Layout version, [`SCHEMA`].
     pub schema: u32,
-    /// Stage that was run alone: `explore`, `identify` or `solve`; empty for a whole run.
-    /// What `explore` and `solve` show is predicted by the simulator.
+    /// Stage that was run alone: `explore`, `identify` or `solve`; empty for a whole run. For
+    /// `explore` and `solve` the simulator predicts what is shown.
     pub stage: String,
     /// Name of the task.
     pub task: String,
@@ -40,11 +40,11 @@ pub struct RunReport {
     pub solver: String,
     /// The seed.
     pub seed: u64,
-    /// What answered as the real world.
+    /// The source of real episodes.
     pub real_world: RealWorld,
-    /// The answer in one sentence; made from the numbers where it is empty.
+    /// The answer in one sentence; generated from the numbers if empty.
     pub answer: String,
-    /// The unknowns and what became known of them.
+    /// The unknowns, with what became known of them.
     pub parameters: Vec<ParameterReport>,
     /// The real episode, seen from above.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -54,18 +54,18 @@ pub struct RunReport {
     pub view: Option<View>,
     /// Tracked signals of the real episode with their replays.
     pub signals: Vec<Signal>,
-    /// What the exploration was for and what it gathered.
+    /// Objective of the exploration, and what it gathered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exploration: Option<Exploration>,
-    /// How the explorer learnt or planned.
+    /// Learning curve of the explorer, or of its planning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub learning: Option<LearningCurve>,
-    /// The task itself, done once with what was learnt.
+    /// The task itself, attempted once with what was learnt.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub downstream: Option<Downstream>,
-    /// What the stages took.
+    /// Cost of the stages.
     pub costs: Vec<StageCost>,
-    /// Time of the whole run in s; NaN where it is not known.
+    /// Time of the whole run, s; NaN if unknown.
     #[serde(deserialize_with = "nullable::scalar")]
     pub wall_s: f64,
     /// Physics steps of the whole run.
@@ -76,7 +76,7 @@ pub struct RunReport {
     pub versions: Vec<NamedText>,
     /// The command line that repeats the run.
     pub command: String,
-    /// What else lies in the run's folder.
+    /// Other files in the run's folder.
     pub files: Vec<FileEntry>,
     /// Remarks for the reader, such as simulations that diverged.
     pub notes: Vec<String>,
@@ -115,19 +115,19 @@ impl Default for RunReport {
     }
 }
 
-/// What answered as the real world.
+/// The source of real episodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RealWorld {
-    /// Kind, such as `perturbed`; empty where it is not known.
+    /// Kind, such as `perturbed`; empty if unknown.
     pub kind: String,
-    /// Engine, or what else it was: `logs`, `robot`.
+    /// Engine, or another source: `logs`, `robot`.
     pub engine: String,
-    /// Model file, where it is not the task's own scene; empty otherwise.
+    /// Model file, if it is not the task's own scene; empty otherwise.
     pub model: String,
     /// Effects that the simulator lacks, as `name@site:parameter=value`.
     pub effects: Vec<String>,
-    /// Noise of the readings in words, such as `2 mm, 0.01 rad`; empty where it is not known.
+    /// Noise of the readings in words, such as `2 mm, 0.01 rad`; empty if unknown.
     pub noise: String,
 }
 
@@ -144,7 +144,7 @@ pub struct NamedValue {
     pub unit: String,
 }
 
-/// An unknown and what became known of it.
+/// An unknown, with what became known of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ParameterReport {
@@ -152,24 +152,24 @@ pub struct ParameterReport {
     pub name: String,
     /// Unit of every number here; may be empty.
     pub unit: String,
-    /// Where it acts in the scene, such as `geom/rod/mass`; may be empty.
+    /// Target in the scene, such as `geom/rod/mass`; may be empty.
     pub target: String,
-    /// Draw it on a logarithmic axis.
+    /// Whether to draw it on a logarithmic axis.
     pub log_scale: bool,
-    /// The hidden truth, where there is one to be known.
+    /// The hidden truth, if it is known.
     pub truth: Option<f64>,
     /// Point estimate (posterior mean).
     #[serde(deserialize_with = "nullable::scalar")]
     pub estimate: f64,
-    /// Posterior standard deviation; NaN where it is not known.
+    /// Posterior standard deviation; NaN if unknown.
     #[serde(deserialize_with = "nullable::scalar")]
     pub std: f64,
-    /// Ends of the central 95 % interval; NaN where they are not known.
+    /// Ends of the central 95 % interval; NaN if unknown.
     #[serde(deserialize_with = "nullable::array")]
     pub interval95: [f64; 2],
-    /// What was believed before.
+    /// The prior.
     pub prior: Option<Prior>,
-    /// The distribution from iteration to iteration.
+    /// Quantiles after each iteration.
     pub narrowing: Vec<Narrowing>,
     /// Samples of the final posterior, at most a few thousand.
     #[serde(deserialize_with = "nullable::list")]
@@ -198,29 +198,29 @@ impl Default for ParameterReport {
     }
 }
 
-/// What was believed of a parameter before.
+/// The prior of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Prior {
-    /// Every value in the range alike.
+    /// Uniform over the range.
     Uniform {
         /// Lower end.
         low: f64,
         /// Upper end.
         high: f64,
     },
-    /// Every ratio in the range alike; `low` is positive.
+    /// Uniform in the logarithm over the range; `low` is positive.
     LogUniform {
         /// Lower end.
         low: f64,
         /// Upper end.
         high: f64,
     },
-    /// A Gaussian, cut off at a range.
+    /// A Gaussian truncated to a range.
     Normal {
-        /// Mean before the cut.
+        /// Mean before the truncation.
         mean: f64,
-        /// Standard deviation before the cut.
+        /// Standard deviation before the truncation.
         std: f64,
         /// Lower end.
         low: f64,

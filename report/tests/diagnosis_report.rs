@@ -1,4 +1,4 @@
-//! The page of a diagnosis: whole, well-formed and legible, whatever was found.
+//! The page of a diagnosis: complete, well-formed and legible, whatever was found.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -16,7 +16,7 @@ fn page(d: &Diagnosis) -> String {
     asid_report::diagnosis::page(&d.result, &d.trace)
 }
 
-/// A diagnosis of each kind, one of nothing, and ones whose numbers are none.
+/// A diagnosis of each kind, an empty one, and ones with non-finite numbers.
 fn diagnoses() -> [Diagnosis; 7] {
     let mut numberless = diagnosed::patch();
     numberless.result.gap = Default::default();
@@ -91,7 +91,7 @@ fn stored(d: &Diagnosis) -> Diagnosis {
 #[test]
 fn stored_data_give_the_same_page() {
     for d in diagnoses() {
-        // NaN is null in JSON and comes back as NaN; so does what is infinite.
+        // NaN is null in JSON and becomes NaN again; so do infinite values.
         let once = stored(&d);
         let twice = stored(&once);
         assert!(page(&once) == page(&twice), "{} differs", d.result.study);
@@ -160,7 +160,7 @@ fn the_missing_force_is_drawn_with_the_law_and_an_early_end_says_what_was_left_o
     ] {
         assert!(html.contains(told), "{told}");
     }
-    // What was not estimated is not shown.
+    // Values that were not estimated are not shown.
     let html = page(&diagnosed::patch());
     for untold in [
         "that is missing",
@@ -183,6 +183,6 @@ fn missing_readings_interrupt_the_lines() {
     };
     let whole = count(&d);
     d.trace.signals[0].identified[40..50].fill(f64::NAN);
-    // Two widths; the identified model in the picture and in its residual.
+    // Two widths; the identified model is in the picture and in its residual.
     assert_eq!(count(&d), whole + 4);
 }

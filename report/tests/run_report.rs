@@ -1,4 +1,4 @@
-//! The page of a run: whole, well-formed and legible, whatever the run kept.
+//! The page of a run: complete, well-formed and legible, whatever data the run kept.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -65,7 +65,7 @@ fn a_stored_trace_gives_the_same_page() {
         let read = RunReport::from_json(&run.to_json().unwrap()).unwrap();
         assert!(read.html() == run.html(), "{} differs", run.task);
     }
-    // NaN is null in JSON and comes back as NaN.
+    // NaN is null in JSON and becomes NaN again.
     assert!(
         RunReport::from_json("{\"schema\":1,\"wall_s\":null}")
             .unwrap()
@@ -99,7 +99,8 @@ fn the_answer_and_the_verdict_are_on_the_page() {
     assert!(bare.contains("No downstream part") && bare.contains("No learning curve"));
 }
 
-/// A trial says of which iteration it is: a `trace.json` with 2147483647 there took 8 s, one number for each iteration until then.
+/// A trial states its iteration. A `trace.json` with 2147483647 there took 8 s, because each
+/// iteration up to that number was visited.
 #[test]
 fn an_iteration_of_any_number_is_drawn_at_once() {
     let mut run = synthetic::full_run();
@@ -108,6 +109,6 @@ fn an_iteration_of_any_number_is_drawn_at_once() {
     let began = std::time::Instant::now();
     let html = run.html();
     assert!(html.contains("4294967296 iterations of the solver"));
-    // Milliseconds, where counting up takes ten seconds and more.
+    // It takes milliseconds; counting up takes ten seconds and more.
     assert!(began.elapsed().as_secs_f64() < 5.0);
 }

@@ -1,4 +1,4 @@
-//! Diagnoses that never happened, with the shapes and sizes of those that do.
+//! Invented diagnoses, with the shapes and sizes of real ones.
 
 #[path = "missing.rs"]
 mod missing;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use asid_results::diagnosis::*;
 use asid_results::trace::*;
 
-/// What a page is drawn from.
+/// The data of a page.
 #[derive(Clone, Default)]
 pub struct Diagnosis {
     pub result: DiagnosisResult,
@@ -45,7 +45,7 @@ fn effect(label: [&str; 2], probability: f64, closes: f64, values: &[(&str, f64)
     }
 }
 
-/// What a catalogue says of an effect: unit and null of its parameters by name.
+/// The catalogue's entry of an effect: unit and null value of its parameters by name.
 fn words(name: &str, about: &str, parameters: &[(&str, &str, f64)]) -> (String, EffectWords) {
     let words = |(name, unit, null): &(&str, &str, f64)| {
         let unit = (*unit).to_owned();
@@ -78,7 +78,7 @@ fn signal_gap(signal: &str, unit: &str, noise: f64, gaps: [f64; 3]) -> SignalGap
     }
 }
 
-/// Its gap, whole and by signal.
+/// Its gap, in total and by signal.
 fn patch_gap() -> Gap {
     Gap {
         nominal: 41.3,
@@ -99,7 +99,7 @@ fn patch_gap() -> Gap {
     }
 }
 
-/// Where it lies.
+/// Where the gap lies.
 fn patch_places() -> Vec<Where> {
     [
         (
@@ -130,7 +130,7 @@ fn patch_places() -> Vec<Where> {
     .into()
 }
 
-/// Effects that were tried on it.
+/// Effects that were tried.
 fn patch_effects() -> Vec<EffectResult> {
     vec![
         effect(
@@ -166,7 +166,7 @@ fn patch_effects() -> Vec<EffectResult> {
     ]
 }
 
-/// What its task gains by the refined model.
+/// What its task gains from the refined model.
 fn patch_in_the_real_world() -> RealWorld {
     RealWorld {
         task: "shuffleboard".into(),
@@ -197,7 +197,7 @@ fn patch_in_the_real_world() -> RealWorld {
     }
 }
 
-/// Words of the effects that were tried on it.
+/// Catalogue entries of the effects that were tried.
 fn patch_catalogue() -> BTreeMap<String, EffectWords> {
     [
         words(
@@ -229,7 +229,7 @@ fn patch_catalogue() -> BTreeMap<String, EffectWords> {
     .into()
 }
 
-/// What each explanation leaves of its gap.
+/// What each explanation leaves of the gap.
 fn patch_ladder() -> Vec<Rung> {
     [
         ("friction-patch@board", 1.9),
@@ -246,7 +246,7 @@ fn patch_ladder() -> Vec<Rung> {
     .into()
 }
 
-/// A puck on a board with a rougher far half, which one other effect explains as well.
+/// A puck on a board with a rougher far half, which one other effect explains equally well.
 pub fn patch() -> Diagnosis {
     let signals = puck();
     let map = map(&signals);
@@ -379,7 +379,7 @@ pub fn complete() -> Diagnosis {
     Diagnosis { result, trace }
 }
 
-/// The same by the missing force, stopped early.
+/// The same diagnosis by the missing force, stopped early.
 pub fn by_force() -> Diagnosis {
     let mut d = patch();
     d.trace.map = None;
@@ -387,7 +387,8 @@ pub fn by_force() -> Diagnosis {
     d
 }
 
-/// A gap that nothing explains; many signals, hostile names, readings that are missing, simulations that diverge.
+/// A gap that nothing explains, with many signals, hostile names, missing readings and diverging
+/// simulations.
 pub fn crowded() -> Diagnosis {
     let long = "friction-anisotropy@a_body_with_a_name_that_is_much_too_long_for_a_phone";
     let mut patch = patch();
@@ -480,10 +481,10 @@ fn arm(episode: usize) -> impl Iterator<Item = SignalTrace> {
     })
 }
 
-/// Signal, unit, noise, and how it follows from the distance.
+/// Signal, unit, noise, and its dependence on the distance.
 type Part<'a> = (&'static str, &'static str, f64, &'a dyn Fn(f64) -> f64);
 
-/// Three slides of a puck: position and yaw, and what three models make of them.
+/// Three slides of a puck: position and yaw, and the predictions of three models.
 fn puck() -> Vec<SignalTrace> {
     let mut noise = Noise(17);
     let mut signals = Vec::new();
@@ -509,7 +510,7 @@ fn puck() -> Vec<SignalTrace> {
                 .iter()
                 .map(|x| x + deviation * noise.normal())
                 .collect();
-            // The tracker lost it for a moment.
+            // The tracker lost the puck for a moment.
             real[61..70].fill(f64::NAN);
             signals.push(SignalTrace {
                 episode: format!("test_{episode}.csv"),
@@ -527,7 +528,7 @@ fn puck() -> Vec<SignalTrace> {
     signals
 }
 
-/// How far a puck has slid, with one friction up to 0.41 m and another beyond.
+/// Distance that a puck has slid, with one friction up to 0.41 m and another beyond.
 fn slide(time: &[f64], speed: f64, friction: [f64; 2]) -> Vec<f64> {
     let (mut x, mut v) = (0.0, speed);
     let mut path = Vec::with_capacity(time.len());
@@ -557,7 +558,7 @@ fn map(signals: &[SignalTrace]) -> Map {
     }
 }
 
-/// Small normal numbers from a generator of its own.
+/// Small normal random numbers from a simple generator.
 struct Noise(u64);
 
 impl Noise {

@@ -1,8 +1,8 @@
-//! Writes reports of made-up but realistic data, to look at the layout.
+//! Writes reports of invented but realistic data, to inspect the layout.
 //!
-//! `cargo run -p asid-report --example gallery -- FOLDER` writes runs (`full`, `bare`
-//! and `crowded`, each with `trace.json`) and diagnoses (`patch`, `force`, `complete`,
-//! `unexplained` and `empty`) below it, each with `report.html`.
+//! `cargo run -p asid-report --example gallery -- FOLDER` writes runs (`full`, `bare` and
+//! `crowded`, each with `trace.json`) and diagnoses (`patch`, `force`, `complete`, `unexplained`
+//! and `empty`) below it, each with `report.html`.
 
 mod diagnosed;
 mod synthetic;
@@ -42,7 +42,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The folder of a report, made where it is not there.
+/// The folder of a report, created if missing.
 fn made(folder: &Path, name: &str) -> Result<PathBuf> {
     let path = folder.join(name);
     std::fs::create_dir_all(&path).map_err(|e| Error::File {

@@ -1,11 +1,13 @@
-//! What a diagnosis by the missing force shows: forces along the logs, evidence, angles between effects.
+//! The parts of a diagnosis by the missing force: forces along the logs, evidence, angles between
+//! effects.
 
 use asid_results::diagnosis::*;
 use asid_results::trace::*;
 
 use super::{Diagnosis, Noise, names};
 
-/// A joint with dry friction that a spring was named beside: most of what is missing lies on the law.
+/// A joint with dry friction, beside which a spring was named: most of the missing force lies on
+/// the law.
 fn joint(dof: &str, size: f64) -> ForceTrace {
     let mut noise = Noise(9);
     let mut series = |rows: usize, gap: f64| {
@@ -41,7 +43,7 @@ fn joint(dof: &str, size: f64) -> ForceTrace {
     }
 }
 
-/// Adds it to a diagnosis.
+/// Adds these parts to a diagnosis.
 pub fn add(d: &mut Diagnosis) {
     d.trace.forces = ["shoulder", "elbow", "wrist"]
         .iter()

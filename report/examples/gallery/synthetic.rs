@@ -1,13 +1,13 @@
-//! Runs that never happened, with the shapes and sizes of those that do.
+//! Invented runs, with the shapes and sizes of real ones.
 
 use asid_report::run::*;
 
-/// Truth and estimate of the made-up run, in m.
+/// Truth and estimate of the invented run, m.
 const TRUTH: f64 = 0.06;
 const ESTIMATE: f64 = 0.0612;
 const STD: f64 = 0.0021;
 
-/// A run that kept nothing that is optional.
+/// A run without any optional data.
 pub fn bare_run() -> RunReport {
     RunReport {
         task: "rod-balancing".into(),
@@ -17,7 +17,7 @@ pub fn bare_run() -> RunReport {
     }
 }
 
-/// Rod balancing with everything there is to show.
+/// Rod balancing with all optional data.
 pub fn full_run() -> RunReport {
     let mut noise = Noise(7);
     RunReport {
@@ -64,7 +64,8 @@ pub fn full_run() -> RunReport {
     }
 }
 
-/// Several unknowns of every kind, two action dimensions, long and hostile names, numbers that are none.
+/// Several unknowns of every kind, two action dimensions, long and hostile names, non-finite
+/// numbers.
 pub fn crowded_run() -> RunReport {
     let mut noise = Noise(11);
     let mut report = full_run();
@@ -185,7 +186,8 @@ fn parameter(noise: &mut Noise) -> ParameterReport {
     }
 }
 
-/// Pose of the rod when its mass sits `offset` from the middle: pushed at its middle, it turns about the mass.
+/// Pose of the rod when its mass is `offset` from the middle: pushed at its middle, it turns about
+/// the mass.
 fn pose(t: f64, offset: f64) -> [f64; 3] {
     let push = ((t - 0.45) / 1.3).clamp(0.0, 1.0);
     let smooth = push * push * (3.0 - 2.0 * push);
@@ -399,7 +401,7 @@ fn downstream(noise: &mut Noise) -> Downstream {
     }
 }
 
-/// Normal numbers from a linear congruential generator: enough for a picture.
+/// Normal random numbers from a linear congruential generator: sufficient for a picture.
 struct Noise(u64);
 
 impl Noise {

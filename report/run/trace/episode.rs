@@ -1,4 +1,4 @@
-//! The real episode: what was seen of it, and its replays.
+//! The real episode: what was recorded, and its replays.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ pub struct Episode {
     /// The workspace as `[x_low, x_high, y_low, y_high]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workspace: Option<[f64; 4]>,
-    /// What stands still: table, walls, goal, ledge.
+    /// Static things: table, walls, goal, ledge.
     pub shapes: Vec<Shape>,
 }
 
@@ -29,7 +29,7 @@ pub struct ObjectTrack {
     /// Its outline in its own frame, a polygon in m.
     #[serde(deserialize_with = "nullable::rows")]
     pub outline: Vec<[f64; 2]>,
-    /// Whether it has no heading that could be told, as a ball.
+    /// Whether it has no visible heading, like a ball.
     pub round: bool,
     /// Times of the poses in s.
     #[serde(deserialize_with = "nullable::list")]
@@ -43,7 +43,7 @@ pub struct ObjectTrack {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PlanarPath {
-    /// Times in s; a dot is drawn at each, so control steps serve better than physics steps.
+    /// Times, s. A dot is drawn at each, so use control steps rather than physics steps.
     #[serde(deserialize_with = "nullable::list")]
     pub time: Vec<f64>,
     /// Position at each time in m.
@@ -51,30 +51,30 @@ pub struct PlanarPath {
     pub position: Vec<[f64; 2]>,
 }
 
-/// What a shape is, which decides its colour.
+/// What a shape represents, which determines its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ShapeKind {
-    /// Table, wall, ledge: it only stands there.
+    /// Table, wall, ledge: static things.
     #[default]
     Fixed,
     /// Where something should go.
     Goal,
     /// The object of the task.
     Object,
-    /// A part of the object to be told apart, such as its movable mass.
+    /// A distinguishable part of the object, such as its movable mass.
     Part,
     /// The robot.
     Robot,
 }
 
-/// A polygon, or a circle where it has a radius.
+/// A polygon, or a circle if it has a radius.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Shape {
     /// Text for the legend; may be empty.
     pub label: String,
-    /// What it is.
+    /// What it represents.
     pub kind: ShapeKind,
     /// Corners of the polygon in m, or the circle's centre.
     #[serde(deserialize_with = "nullable::rows")]
@@ -92,7 +92,7 @@ pub struct Signal {
     pub name: String,
     /// Unit of the values.
     pub unit: String,
-    /// Standard deviation of a reading's noise, where it is known.
+    /// Standard deviation of a reading's noise, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise_std: Option<f64>,
     /// Times of the readings in s.
@@ -113,7 +113,7 @@ pub struct Signal {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Replay {
-    /// Times in s, increasing; need not be those of the readings.
+    /// Times, s, increasing; they may differ from those of the readings.
     #[serde(deserialize_with = "nullable::list")]
     pub time: Vec<f64>,
     /// Value at each time.

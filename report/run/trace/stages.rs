@@ -1,17 +1,17 @@
-//! What exploration, learning and the task left behind.
+//! The data of exploration, learning and the task.
 
 use serde::{Deserialize, Serialize};
 
 use super::{NamedValue, Shape};
 use asid_results::nullable;
 
-/// What the exploration was for and what the real episode gathered.
+/// Objective of the exploration, and what the real episode gathered.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Exploration {
     /// The objective by name: `trace`, `a-optimal`, `d-optimal`.
     pub objective: String,
-    /// `one-step` or `trajectory`: what the sensitivities count.
+    /// `one-step` or `trajectory`: what the sensitivities include.
     pub form: String,
     /// Time at the end of each control step in s.
     #[serde(deserialize_with = "nullable::list")]
@@ -43,7 +43,7 @@ pub struct ExpectedStd {
     pub value: Vec<f64>,
 }
 
-/// How the explorer's return rose.
+/// Learning curve of the explorer's return.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LearningCurve {
@@ -65,30 +65,30 @@ pub struct LearningCurve {
     pub best: Vec<f64>,
 }
 
-/// The task itself, done once in the real world.
+/// The task itself, attempted once in the real world.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Downstream {
     /// Metric by name, such as `tilt_deg`.
     pub metric: String,
-    /// What it is called in a sentence, such as `tilt`.
+    /// Its name in a sentence, such as `tilt`.
     pub label: String,
     /// Unit of the metric.
     pub unit: String,
-    /// Its value at the end.
+    /// Its final value.
     #[serde(deserialize_with = "nullable::scalar")]
     pub value: f64,
     /// Whether the task's rule of success held.
     pub success: bool,
     /// The rule in words, such as `below 5° and still on the ledge`.
     pub rule: String,
-    /// The metric's limit in `unit`, where the rule has one.
+    /// The metric's limit in `unit`, if the rule has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold: Option<f64>,
     /// Times in s.
     #[serde(deserialize_with = "nullable::list")]
     pub time: Vec<f64>,
-    /// The metric (or what it is read from) at each time, in `unit`.
+    /// The metric (or the quantity it is read from) at each time, in `unit`.
     #[serde(deserialize_with = "nullable::list")]
     pub metric_over_time: Vec<f64>,
     /// Phases of the motion.
@@ -101,7 +101,7 @@ pub struct Downstream {
     pub side_view: Option<SideView>,
 }
 
-/// A stretch of the task's motion.
+/// A phase of the task's motion.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Phase {
     /// Name, such as `lift`.
@@ -120,7 +120,7 @@ pub struct Phase {
 pub struct Search {
     /// Chosen action: one entry a dimension, with its name and unit.
     pub chosen: Vec<NamedValue>,
-    /// What the cost is, such as `expected tilt`.
+    /// Name of the cost, such as `expected tilt`.
     pub cost_label: String,
     /// Unit of the cost.
     pub cost_unit: String,
@@ -147,9 +147,9 @@ pub struct Trial {
 pub struct SideView {
     /// Label of the horizontal axis, such as `y` or `along the rod`.
     pub x_label: String,
-    /// Height below which there is nothing to see, such as the table's top.
+    /// Height below which nothing is shown, such as the table's top.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor: Option<f64>,
-    /// What is seen, back to front.
+    /// The shapes, back to front.
     pub shapes: Vec<Shape>,
 }

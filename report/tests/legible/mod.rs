@@ -1,4 +1,4 @@
-//! What every page must be: well-formed, self-contained, and with texts that can be read.
+//! Requirements on every page: well-formed, self-contained, and with legible texts.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -8,19 +8,19 @@ use asid_report::markup::text_width;
 use asid_report::plot::FONT_SIZE;
 use roxmltree::{Document, Node};
 
-/// The page without its document type, which is not XML's.
+/// The page without its document type, which is not that of XML.
 pub fn xml(html: &str) -> &str {
     html.strip_prefix("<!DOCTYPE html>").unwrap()
 }
 
-/// Identifiers are unique, references lead somewhere, coordinates are numbers.
+/// Checks that identifiers are unique, references resolve, and coordinates are numbers.
 pub fn well_formed(html: &str, name: &str) {
     let document = Document::parse(xml(html)).unwrap();
     let mut seen = HashSet::new();
     for id in document.descendants().filter_map(|n| n.attribute("id")) {
         assert!(seen.insert(id), "{id} twice in {name}");
     }
-    // Whatever an attribute refers to is there.
+    // Everything that an attribute refers to exists.
     for labels in document
         .descendants()
         .filter_map(|n| n.attribute("aria-labelledby"))
@@ -39,14 +39,14 @@ pub fn well_formed(html: &str, name: &str) {
     }
 }
 
-/// The page opens offline.
+/// Checks that the page opens offline.
 pub fn fetches_nothing(html: &str) {
     for fetching in ["<link", "<img", "src=", "@import", "url(http", "<iframe"] {
         assert!(!html.contains(fetching), "{fetching}");
     }
 }
 
-/// No text of a plot meets another one or leaves the plot.
+/// Checks that no text of a plot overlaps another one or leaves the plot.
 pub fn texts_apart(html: &str, name: &str) {
     let document = Document::parse(xml(html)).unwrap();
     for svg in document.descendants().filter(|n| n.has_tag_name("svg")) {
