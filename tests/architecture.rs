@@ -1,4 +1,5 @@
-//! Crates use each other as `docs/architecture.md` says, and neither they nor the modules of a crate use each other in circles.
+//! Crates use each other as `docs/architecture.md` says, without cycles between crates or between
+//! the modules of a crate.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,7 +12,7 @@ use source_support::{root, sources, untested};
 
 type Names = BTreeSet<String>;
 
-/// The folders of the crates in the page's table from above, each with those that it uses.
+/// The crates' folders in the page's table from the top, each with the folders that it uses.
 fn page() -> Vec<(String, Names)> {
     let text = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
     let quoted = |cell: &str| -> Vec<String> {
@@ -27,7 +28,7 @@ fn page() -> Vec<(String, Names)> {
     .collect()
 }
 
-/// A crate's folder, and the folders of the workspace's crates that it depends on.
+/// Each crate's folder, with the folders of the workspace's crates that it depends on.
 fn manifests() -> BTreeMap<String, Names> {
     let read = |folder: &str| -> toml::Table {
         let file = root().join(folder).join("Cargo.toml");
@@ -69,7 +70,7 @@ fn crates_use_each_other_as_the_page_says() {
         assert!(below.is_empty(), "`{folder}` uses {below:?}, below it");
         above.insert(folder.clone());
     }
-    // A crate that is not in the table is used only by others that are not.
+    // A crate outside of the table is used only by others outside of it.
     let outside = |folder: &str| !above.contains(folder);
     for (folder, uses) in manifests.iter().filter(|(folder, _)| !outside(folder)) {
         let strange: Vec<_> = uses.iter().filter(|u| outside(u)).collect();
@@ -77,7 +78,7 @@ fn crates_use_each_other_as_the_page_says() {
     }
 }
 
-/// Modules at the top of a crate that `text`, a module `depth` folders down, speaks of.
+/// Top-level modules of a crate that `text`, a module `depth` folders down, refers to.
 fn mentioned(text: &str, depth: usize) -> Names {
     let code: String = untested(text)
         .lines()
@@ -125,7 +126,7 @@ fn mentioned(text: &str, depth: usize) -> Names {
     found
 }
 
-/// The modules at the top of a crate, each with those that it uses.
+/// The top-level modules of a crate, each with the modules that it uses.
 fn modules(folder: &str) -> BTreeMap<String, Names> {
     let folder = root().join(folder);
     let source = if folder.join("src").exists() {
@@ -160,7 +161,8 @@ fn modules(folder: &str) -> BTreeMap<String, Names> {
     graph
 }
 
-/// What is left of a graph when everything that uses nothing left is taken away, again and again.
+/// Returns the cycles of a graph: what is left after everything that uses nothing is removed
+/// repeatedly.
 fn circles(mut graph: BTreeMap<String, Names>) -> BTreeMap<String, Names> {
     while let Some(free) = graph
         .iter()

@@ -1,4 +1,4 @@
-//! Comparisons of methods through the real binary.
+//! Comparisons of methods with the real binary.
 
 #![allow(clippy::unwrap_used)]
 
@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use cli_support::{Workplace, tiny};
 use serde_json::Value;
 
-/// Files that are the same however a comparison came about.
+/// Files that do not depend on how a comparison was run.
 const SAME: [&str; 5] = [
     "result.json",
     "runs.json",
@@ -25,7 +25,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Compares on rod balancing in a folder.
+/// Compares methods on rod balancing in a folder.
 fn compare(place: &Workplace, arguments: &[&str], out: &str) -> Output {
     let common = ["compare", "rod-balancing", "--quiet", "--out", out];
     place.run(&tiny(&[&common, arguments].concat()))
@@ -40,7 +40,7 @@ fn result(place: &Workplace, out: &str) -> Value {
     serde_json::from_str(&place.read(&format!("{out}/result.json"))).unwrap()
 }
 
-/// Copies a folder with all that is below it.
+/// Copies a folder recursively.
 fn copy_folder(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for name in cli_support::names(from) {
@@ -53,7 +53,7 @@ fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// One seed of each method, the condition `left`.
+/// One seed of each method, in the condition `left`.
 const SMALL: [&str; 4] = ["--condition", "left", "--seeds", "1"];
 
 #[test]
@@ -91,13 +91,13 @@ fn every_method_has_a_row_of_its_own_with_its_parts_settings_and_commit() {
         let hash = row["settings"].as_str().unwrap();
         assert!(!hashes.contains(&hash), "each has other settings");
         hashes.push(hash);
-        // What the hash stands for is there.
+        // The settings behind the hash are there.
         assert!(
             place
                 .read(&format!("a/settings/{hash}.toml"))
                 .contains("solver")
         );
-        // An explored row says what it found, the others have nothing to say.
+        // A row with exploration reports its identification, the others report none.
         let identified = row["identification"].as_array().unwrap().len();
         let explores = row["explorer"] != "none";
         assert_eq!(identified, usize::from(explores), "{}", row["method"]);
@@ -112,8 +112,8 @@ fn every_method_has_a_row_of_its_own_with_its_parts_settings_and_commit() {
     roxmltree::Document::parse_with_options(&page, options).unwrap();
 }
 
-/// What the tests of interruptions and of shares are held against: two seeds of a method that explores
-/// and of one that does not.
+/// Reference of the tests of interruptions and of shares: two seeds of a method that explores and
+/// of one that does not.
 const PAIR: [&str; 8] = [
     "--method",
     "random",
@@ -143,7 +143,7 @@ fn assert_as_whole(place: &Workplace, folder: &str) {
     }
 }
 
-/// Killed once a cell is there, and gone on with on three threads.
+/// The comparison is killed once a cell is there, and continued with three threads.
 #[test]
 fn an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes_at_any_threads() {
     let place = Workplace::new();
@@ -229,7 +229,7 @@ fn shares_in_one_folder_or_merged_give_the_bytes_of_one_process() {
     let place = Workplace::new();
     done(&place, &[&PAIR[..], &["--shard", "1/2"]].concat(), "all");
     assert!(!place.path("all/result.json").exists());
-    // The same share on its own, and the other one in both ways.
+    // The same share on its own, and the other share in both ways.
     copy_folder(&place.path("all"), &place.path("1-2"));
     let second = [&PAIR[..], &["--shard", "2/2"]].concat();
     done(&place, &second, "2-2");
@@ -376,14 +376,14 @@ fn a_folder_of_other_settings_is_not_mixed_with() {
         "{text}"
     );
     assert!(text.lines().count() == 1, "{text}");
-    // More seeds are more of the same.
+    // More seeds extend the comparison.
     done(
         &place,
         &["--method", "dr", "--condition", "left", "--seeds", "2"],
         "a",
     );
     assert_eq!(result(&place, "a")["rows"][0]["n"], 2);
-    // A folder of something else is never touched.
+    // A folder with something else is never changed.
     std::fs::create_dir(place.path("run")).unwrap();
     place.write("run/config.toml", "task = 'rod-balancing'");
     let taken = compare(&place, &dr, "run");
@@ -486,7 +486,7 @@ fn a_method_that_cannot_be_run_is_left_out_with_the_reason_and_stops_no_other() 
             .read("a/table.md")
             .contains(&format!("> Left out: {lacking} on rod-balancing"))
     );
-    // Alone there is nothing to compare.
+    // Without the other method there is nothing to compare.
     let alone = compare(&place, &left, "b");
     assert_eq!(alone.status.code(), Some(2));
     assert!(

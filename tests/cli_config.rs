@@ -1,4 +1,4 @@
-//! `asid config`: what it prints is a configuration, and the whole of one.
+//! `asid config` prints a complete configuration that can be read back.
 
 #![allow(clippy::unwrap_used)]
 
@@ -17,7 +17,7 @@ fn printed(place: &Workplace, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Asserts that a page holds all of some texts.
+/// Asserts that a page has all of some texts.
 fn assert_tells(page: &str, texts: &[&str]) {
     for told in texts {
         assert!(page.contains(told), "`{told}` is not in\n{page}");
@@ -92,7 +92,7 @@ fn settings_of_each_command_on_a_study_stand_under_their_meanings() {
         &identify,
         &["[gauss_newton]", "# Most iterations from each start."],
     );
-    // A model has no logs: what can be done with it is to explore.
+    // A model has no logs: it can only be explored.
     let model = printed(&place, &[&(study + "/nominal.xml")]);
     assert_tells(&model, &["asid explore", "[design]"]);
 }

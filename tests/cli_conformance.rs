@@ -1,4 +1,4 @@
-//! `asid conformance` through the real binary: rows, files, status, and plugins.
+//! `asid conformance` with the real binary: rows, files, exit status and plugins.
 
 #![allow(clippy::unwrap_used)]
 
@@ -136,8 +136,8 @@ fn checks_and_their_scenes_are_printed_without_rows() {
     assert!(document.root_element().has_tag_name("mujoco"));
 }
 
-/// An engine in C that falls by nine tenths of gravity: alone in the table when its
-/// file is all that is named, told by the rows that see it, and by the exit status.
+/// An engine in C with nine tenths of gravity. It is alone in the table if only its file is named.
+/// The rows that detect the fault and the exit status report it.
 #[cfg(unix)]
 #[test]
 fn a_wrong_plugin_fails_alone() {

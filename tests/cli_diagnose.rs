@@ -11,7 +11,7 @@ use program::{asid, json, text};
 use serde_json::Value;
 use world::{Truth, write_study};
 
-/// One line on standard error, and the exit status.
+/// Returns the one line on standard error, and the exit status.
 fn refusal(arguments: &[&str]) -> (String, Option<i32>) {
     let out = asid(arguments);
     let said = String::from_utf8(out.stderr).unwrap();
@@ -53,7 +53,7 @@ fn a_fault_is_found_and_its_refined_model_has_none() {
     );
     let commands = std::fs::read_to_string(out.join(next["file"].as_str().unwrap())).unwrap();
     assert!(commands.starts_with("time,ctrl."), "{commands}");
-    // The true force is within its interval, and could have been seen were it a tenth of that.
+    // The true force is within its interval, and detectable even at a tenth of its size.
     let effect = &result["effects"][0];
     let [low, high] = [0, 1].map(|i| effect["intervals95"]["force"][i].as_f64().unwrap());
     assert!(low < 1.2 && 1.2 < high, "{low} to {high}");
@@ -70,7 +70,7 @@ fn a_fault_is_found_and_its_refined_model_has_none() {
         (sum - 1.0).abs() < 1e-9 && shares["named"].as_f64().unwrap() > 0.9,
         "{shares}"
     );
-    // The refined model stands in for the model: nothing is left to explain.
+    // The refined model replaces the model: nothing is left to explain.
     let refined = out.join("refined.toml");
     let toml = std::fs::read_to_string(study.join("study.toml")).unwrap();
     let toml = toml.replace("nominal.xml", text(&refined));
@@ -120,13 +120,14 @@ fn the_diagnosis_is_repeated_on_simulated_logs_and_a_rate_of_false_alarms_is_a_p
     let count = |r: &Value, key: &str| r[key].as_u64().unwrap();
     let all: u64 = rows.iter().map(|r| count(r, "runs")).sum();
     assert_eq!(all, found["runs"].as_u64().unwrap());
-    // What lacks nothing is said to lack nothing, and the friction is found where it was put.
+    // A machine without an effect is reported as such, and the friction is found where it was
+    // added.
     for row in rows.iter().take(2).filter(|r| count(r, "runs") > 0) {
         assert_eq!(count(row, "right"), count(row, "runs"), "{row}");
     }
 }
 
-/// What is spoilt, how, and what is said of it.
+/// The part of a study that is broken, how, and the message.
 type Spoilt<'a> = (&'a str, Box<dyn Fn() + 'a>, &'a str);
 
 #[test]
@@ -201,7 +202,7 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     assert!(said.contains("no such file") && status == Some(2), "{said}");
 }
 
-/// Writes each log of a study anew.
+/// Rewrites each log of a study.
 fn rewrite_logs(study: &std::path::Path, anew: impl Fn(&str) -> String) {
     for entry in std::fs::read_dir(study).unwrap() {
         let path = entry.unwrap().path();
@@ -212,8 +213,10 @@ fn rewrite_logs(study: &std::path::Path, anew: impl Fn(&str) -> String) {
     }
 }
 
-/// A start fits two rows whatever the machine is, and that no gap was left passed for a verdict; with a start that is known a column that was taken
-/// for late left nothing, and the program panicked.
+/// Two rows are fitted by an initial state whatever the machine is.
+///
+/// Guards against a verdict from the absence of a gap there, and against a panic where a known
+/// initial state and a column taken as late leave no rows.
 #[test]
 fn logs_of_too_few_rows_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -235,7 +238,8 @@ fn an_ordinary_log_is_read_and_what_was_done_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study");
     write_study(&study, Truth::None);
-    // Stamps in microseconds since boot, a column of no sensor, the position misspelt, the position counted the other way, and a spike.
+    // Stamps in microseconds since boot, a column without a sensor, a misspelt position, the
+    // position with the other sign, and a spike.
     for entry in std::fs::read_dir(&study).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_none_or(|e| e != "csv") {
@@ -301,7 +305,7 @@ fn an_ordinary_log_is_read_and_what_was_done_is_said() {
         result["wiring"]
     );
     assert_eq!(result["verdict"]["kind"], "none", "{}", result["sentence"]);
-    // The lines it gives are the lines that mend it.
+    // The lines that the result gives correct the wiring.
     let mend = result["wiring"][0]["mend"].as_str().unwrap();
     std::fs::write(&toml, format!("{written}{mapping}{mend}\n")).unwrap();
     let result = diagnosed("c");

@@ -8,7 +8,7 @@ mod cli_support;
 use cli_support::Workplace;
 use toml::Table;
 
-/// Explores at random, which takes a moment, and gives the settings that it wrote.
+/// Explores at random, which is quick, and returns the settings that it wrote.
 fn explored(place: &Workplace, out: &str, options: &[&str]) -> Table {
     let mut arguments = vec!["explore", "sphere-distractors", "--explorer", "random"];
     arguments.extend(["--truth", "rolling_friction=0.002", "--quiet", "--out", out]);
@@ -44,11 +44,11 @@ fn a_preset_and_single_values_reach_the_trackers_and_the_config_repeats_them() {
     }
     assert_eq!(number(&config, "noise", "ball_pos"), 0.01);
     assert_eq!(number(&config, "noise", "distractor_3_pos"), 0.01);
-    // The config, given back, repeats it to the byte.
+    // A run with its own configuration repeats it to the byte.
     let again = explored(&place, "b", &["--config", "a/config.toml"]);
     assert_eq!(again, config);
     assert_eq!(place.read("a/real.csv"), place.read("b/real.csv"));
-    // Another difficulty over it has its own noise, and a preset of the command line wins over the file.
+    // Another difficulty has its own noise, and a preset on the command line overrides the file.
     let finer = [
         "--config",
         "a/config.toml",
@@ -65,15 +65,15 @@ fn a_preset_and_single_values_reach_the_trackers_and_the_config_repeats_them() {
     );
     assert_eq!(number(&own, "difficulty", "goal_radius"), 0.05);
     assert_eq!(number(&own, "noise", "ball_pos"), 0.002);
-    // Noise that is said wins over what the difficulty says of it.
+    // Explicit noise overrides that of the difficulty.
     let said = ["--preset", "published", "--set", "noise.ball_pos=0.003"];
     let said = explored(&place, "e", &said);
     assert_eq!(number(&said, "noise", "ball_pos"), 0.003);
     assert_eq!(number(&said, "noise", "distractor_1_pos"), 0.01);
 }
 
-/// A ball has no heading and may be read ten times a second; its path is in the report all the same, and
-/// so is that of each ball beside it.
+/// A ball has no heading and may be read only ten times a second. The report still shows its path
+/// and those of the balls beside it.
 #[test]
 fn reports_show_where_the_balls_went() {
     let place = Workplace::new();

@@ -23,7 +23,7 @@ fn result(place: &Workplace, out: &str) -> Value {
     serde_json::from_str(&place.read(&format!("{out}/result.json"))).unwrap()
 }
 
-/// The page is a document, and the picture another.
+/// Asserts that the page and the picture are well-formed documents.
 fn drawn(place: &Workplace, out: &str) {
     let options = roxmltree::ParsingOptions {
         allow_dtd: true,
@@ -35,8 +35,8 @@ fn drawn(place: &Workplace, out: &str) {
     }
 }
 
-/// Without contact nothing is learned: what is expected and what is found are the prior, to within what a
-/// handful of samples tells.
+/// Without contact nothing is learned: the expected and the actual posterior are the prior, within
+/// the precision of a few samples.
 #[test]
 fn explorers_are_ranked_by_what_identification_makes_of_the_same_episodes() {
     let place = Workplace::new();
@@ -58,7 +58,7 @@ fn explorers_are_ranked_by_what_identification_makes_of_the_same_episodes() {
         .collect();
     let names: Vec<&str> = rows[1..].iter().map(|r| &*r[1]).collect();
     assert_eq!(names, ["random", "fisher-cem", "fisher-cem one-step"]);
-    // All meet the same truth.
+    // All methods have the same truth.
     assert!(rows[1..].iter().all(|r| r[4] == rows[1][4]));
     let shipped = result(&place, "a")["notes"].to_string();
     assert!(
@@ -78,7 +78,8 @@ fn explorers_are_ranked_by_what_identification_makes_of_the_same_episodes() {
     );
 }
 
-/// Levels are comparisons that are kept: with one of them there already, the figure takes it as it is.
+/// Levels are comparisons that are kept. If one of them is there already, the figure uses it as it
+/// is.
 #[test]
 fn a_curve_of_difficulty_goes_on_with_the_levels_that_are_there() {
     let place = Workplace::new();
@@ -94,7 +95,7 @@ fn a_curve_of_difficulty_goes_on_with_the_levels_that_are_there() {
     let numbers = result(&place, "a")["numbers"].clone();
     assert_eq!(numbers.as_array().unwrap().len(), 4);
     assert_eq!(place.read("a/difficulty.csv").lines().count(), 5);
-    // What is left when it was stopped after the first level.
+    // What is left if the figure is stopped after the first level.
     let kept = "b/levels/ledge_width=0.06";
     std::fs::create_dir_all(place.path("b/levels")).unwrap();
     std::fs::rename(place.path("a/levels/ledge_width=0.06"), place.path(kept)).unwrap();
@@ -114,7 +115,7 @@ fn a_curve_of_difficulty_goes_on_with_the_levels_that_are_there() {
         place.read("a/difficulty.csv"),
         place.read("b/difficulty.csv")
     );
-    // A figure that is drawn is never touched.
+    // A finished figure is never changed.
     let again = figure(&place, "difficulty", &arguments, "b");
     assert_eq!(again.status.code(), Some(2));
     assert!(
@@ -230,8 +231,8 @@ fn counts_of_episodes_are_at_least_one() {
     assert!(place.names().is_empty());
 }
 
-/// One episode tells nothing of the paper; an explorer that is named twice plays it once, and two whose values
-/// are the same have a name each.
+/// One episode is no evidence about the paper's claim. An explorer named twice plays once, and two
+/// with the same values have a name each.
 #[test]
 fn few_episodes_make_no_verdict_and_explorers_count_once_by_names_of_their_own() {
     let place = Workplace::new();
@@ -334,8 +335,8 @@ fn without_libtorch_the_figure_of_learned_models_says_so() {
     assert!(place.names().is_empty());
 }
 
-/// A ball that nobody touches lies still: the simulator knows it, and of a model that learned from few
-/// episodes the figure tells how far it lets the ball drift.
+/// A ball that nobody touches lies still, and the simulator knows that. The figure shows how far a
+/// model that learned from few episodes lets the ball drift.
 #[cfg(feature = "torch")]
 #[test]
 fn learned_models_are_held_against_the_simulator() {
@@ -357,7 +358,7 @@ fn learned_models_are_held_against_the_simulator() {
     assert!(of("simulator, fitted", error) < 1e-6);
     let learned = of("learned from fisher-cem", error);
     assert!(learned > 1e-4, "{learned}");
-    // The simulator counts as the tracker's noise, 2 mm.
+    // The simulator's error counts as the tracker's noise, 2 mm.
     let ratio = "left alone outside: error over that of the fitted simulator";
     let expected = learned / 2e-3;
     assert!((of("learned from fisher-cem", ratio) / expected - 1.0).abs() < 1e-9);

@@ -1,4 +1,5 @@
-//! `asid import` and `asid export-log` as the user runs them, on logs that public Python packages wrote.
+//! `asid import` and `asid export-log` as users run them, on logs written by public Python
+//! packages.
 
 #![cfg(feature = "logs")]
 #![allow(clippy::unwrap_used)]
@@ -89,7 +90,7 @@ fn diagnosed(study: &Path, out: &Path) -> Value {
     json(&out.join("result.json"))
 }
 
-/// All numbers of a result by their way into it, but for those that tell how long it took.
+/// Collects all numbers of a result with their paths, except those of elapsed times.
 fn numbers(value: &Value, way: &str, found: &mut Vec<(String, f64)>) {
     match value {
         Value::Number(x) if !way.contains("/seconds") => {
@@ -109,10 +110,13 @@ fn numbers(value: &Value, way: &str, found: &mut Vec<(String, f64)>) {
     }
 }
 
-/// Bags of both storages, MCAP, and a dataset, made by public packages (`logs/tests/fixtures/make.py`), give the
-/// verdict of the CSV study and its values. A bag has the same numbers to the last bit, and so has its result. A dataset
-/// of `LeRobot` is in single precision, 2e-7 rad off, less than the half of a digit that the CSV prints (5e-7 rad) and a thousandth of the noise:
-/// values that are told move by less than a digit of the four that are printed.
+/// Logs of other formats give the verdict and the values of the CSV study.
+///
+/// The logs are bags of both storages, MCAP and a dataset, written by public packages
+/// (`logs/tests/fixtures/make.py`). A bag has bitwise the same numbers, and so has its result. A
+/// dataset of `LeRobot` is in single precision, 2e-7 rad off. That is less than half of the last
+/// digit of the CSV (5e-7 rad) and a thousandth of the noise. Reported values therefore move by
+/// less than one of their four printed digits.
 #[test]
 fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
     let folder = tempfile::tempdir().unwrap();
@@ -148,8 +152,8 @@ fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
             numbers(&wanted[part], part, &mut b);
             assert_eq!(a.len(), b.len(), "{name} {part}");
             for ((way, x), (_, y)) in a.iter().zip(&b) {
-                // The odds of a rival that is far behind are those of a fit that was not gone on with: of a probability a millionth is told, and
-                // one of 1e-15 is what rounding leaves.
+                // The odds of a rival far behind are those of an unfinished fit. Probabilities are
+                // compared to a millionth, since one of 1e-15 is only rounding.
                 let told = if way.ends_with("probability") {
                     1e-3 * relative
                 } else {
@@ -216,7 +220,7 @@ fn a_table_with_other_names_and_units_is_mapped() {
     assert!(apart(&read, &csv) < 1e-9);
 }
 
-/// A model without sensors gets one at each joint: most robots' models have none.
+/// A model without sensors gets one at each joint, since the models of most robots have none.
 #[test]
 fn a_model_without_sensors_reads_its_joints() {
     let folder = tempfile::tempdir().unwrap();
@@ -306,7 +310,7 @@ fn exported_logs_are_read_back_with_the_same_numbers() {
     assert!(apart(&read, &csv) < 1e-9);
 }
 
-/// Its copies had two names, so that a study was written that fitted the log which it held out.
+/// Guards against copies of a log under two names: the study would fit the log that it holds out.
 #[test]
 fn a_log_that_is_fitted_and_held_out_is_refused() {
     let place = tempfile::tempdir().unwrap();
@@ -319,7 +323,7 @@ fn a_log_that_is_fitted_and_held_out_is_refused() {
     assert!(!place.path().join("study").exists());
 }
 
-/// A study was written that `diagnose` refused.
+/// Guards against a study that `diagnose` refuses.
 #[test]
 fn a_log_that_is_named_twice_is_refused() {
     let place = tempfile::tempdir().unwrap();
@@ -388,7 +392,7 @@ fn rewritten(folder: &Path, rewrite: impl Fn(usize, &str) -> String) -> Vec<Path
     EPISODES.into_iter().enumerate().map(one).collect()
 }
 
-/// A table with the cells of one column, its header not, put in place of others.
+/// A table with the cells of one column replaced, except its header.
 fn with_column(csv: &str, column: usize, cell: impl Fn(&str) -> String) -> String {
     let row = |(i, line): (usize, &str)| {
         let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
@@ -400,7 +404,8 @@ fn with_column(csv: &str, column: usize, cell: impl Fn(&str) -> String) -> Strin
     csv.lines().enumerate().map(row).collect()
 }
 
-/// Its noise is none, in units of which the gap was four billion, and no check said a word.
+/// A sensor that never changes has no noise. In units of that noise the gap would be four billion,
+/// without a warning from any check.
 #[test]
 fn a_sensor_that_never_changes_is_named_and_passed_over() {
     let folder = tempfile::tempdir().unwrap();
@@ -441,7 +446,7 @@ fn columns_that_some_logs_lack_are_named_with_their_files() {
     let noted = String::from_utf8_lossy(&done.stderr).into_owned();
     let said = told(&done);
     assert!(said.contains("not used: turning, jaw"), "{said}");
-    // The other logs go on at their own rate.
+    // The other logs keep their own rate.
     let rate = |name: &str| -> f64 {
         let row = said.lines().find(|l| l.starts_with(name)).unwrap();
         row.split_whitespace().nth(2).unwrap().parse().unwrap()

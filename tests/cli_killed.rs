@@ -1,5 +1,5 @@
-//! A command that is killed leaves no half of a result and nothing that stops the next one. `cargo xtask kill` does the same to every
-//! command, at random moments.
+//! A killed command leaves no half-written result, and nothing that stops the next one.
+//! `cargo xtask kill` does the same to every command at random moments.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
@@ -47,7 +47,7 @@ fn a_run_that_is_killed_as_it_writes_is_run_again() {
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        // It may have been as quick as to end before.
+        // The command may have ended before the kill.
         if !place.path("out/result.json").exists() {
             let again = place.run(&tiny(&call));
             let said = String::from_utf8_lossy(&again.stderr);
@@ -63,8 +63,8 @@ fn a_run_that_is_killed_as_it_writes_is_run_again() {
     }
 }
 
-/// Symptom: in a container, where a process has the same number each time, a run after a killed one failed when its work was
-/// done. Cause: the folder that it writes into was named by that number alone.
+/// Symptom: in a container, where a process has the same number each time, a run after a killed one
+/// fails once its work is done. Cause: only that number names the folder that it writes into.
 #[test]
 fn what_a_killed_process_leaves_is_in_nobodys_way() {
     let place = Workplace::new();
@@ -100,7 +100,7 @@ fn a_plugins_folder_that_was_begun_is_begun_anew() {
     );
 }
 
-/// Whether a process has a handler of SIGINT.
+/// Whether a process handles SIGINT.
 #[cfg(target_os = "linux")]
 fn watches(process: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
@@ -109,7 +109,7 @@ fn watches(process: u32) -> bool {
     mask.is_some_and(|m| m & 0b10 != 0)
 }
 
-/// Symptom: Ctrl-C ended a run and an exploration without a word.
+/// Symptom: Ctrl-C ends a run or an exploration without a message.
 #[test]
 #[cfg(target_os = "linux")]
 fn ctrl_c_says_what_was_stopped_and_that_nothing_was_written() {

@@ -1,4 +1,4 @@
-//! What the commands leave behind when all goes well.
+//! Output of the commands when they succeed.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,7 +11,7 @@ fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|e| panic!("{e} in {text}"))
 }
 
-/// Runs a command that must succeed and gives what it printed.
+/// Runs a command that must succeed and returns what it printed.
 fn done(place: &Workplace, arguments: &[&str]) -> (String, String) {
     let output = place.run(arguments);
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
@@ -20,7 +20,7 @@ fn done(place: &Workplace, arguments: &[&str]) -> (String, String) {
     (out, err)
 }
 
-/// A result without what a second run may change.
+/// A result without the elapsed time, which a second run may change.
 fn timeless(text: &str) -> Value {
     let mut value = json(text);
     assert!(value["cost"]["wall_s"].as_f64().unwrap() > 0.0);
@@ -32,7 +32,7 @@ fn is_finite(value: &Value) -> bool {
     value.as_f64().is_some_and(f64::is_finite)
 }
 
-/// The page is well-formed, and nothing in it is fetched from elsewhere.
+/// Asserts that the page is well-formed, and that it fetches nothing from elsewhere.
 fn check_page(html: &str) {
     let body = html
         .trim_start()
@@ -144,7 +144,7 @@ fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_cou
     assert_eq!(attempt.lines().next(), log.lines().next());
     assert_eq!(attempt, place.read("b/attempt.csv"));
 
-    // The stage alone, on the run's own log, finds what the run found.
+    // Identification alone, on the run's own log, finds the run's result.
     done(
         &place,
         &[
@@ -218,7 +218,7 @@ fn the_stages_lead_from_one_to_the_next() {
     assert_eq!(json(&place.read("explored/policy.json"))["start"][0], 0.53);
     check_page(&place.read("explored/report.html"));
 
-    // The settings of one stage serve the next; its start pose does not.
+    // The settings of one stage serve the next, except its initial pose.
     let (out, err) = done(
         &place,
         &[
@@ -245,9 +245,9 @@ fn the_stages_lead_from_one_to_the_next() {
         ]
     );
     let result = json(&place.read("found/result.json"));
-    // Readings without noise are explained to within it, whatever the search found.
+    // Readings without noise are explained to within the noise, whatever the search finds.
     assert!(result["residual"].as_f64().unwrap() < 1.5);
-    // The start pose is tracked to 2 mm and 0.01 rad.
+    // The initial pose is tracked to 2 mm and 0.01 rad.
     assert!((result["starts"][0]["x"].as_f64().unwrap() - 0.53).abs() < 0.006);
     assert_eq!(place.read("found/real.csv"), predicted);
     check_page(&place.read("found/report.html"));
@@ -290,8 +290,8 @@ fn the_stages_lead_from_one_to_the_next() {
     check_page(&place.read("solved/report.html"));
 }
 
-/// The log with its columns changed: `change` gets a row's number (from 0), its column's
-/// name and its cell.
+/// Returns the log with changed cells: `change` gets a row's number from 0, its column's name and
+/// its cell.
 fn altered(log: &str, change: impl Fn(usize, &str, &str) -> String) -> String {
     let mut lines = log.lines();
     let header = lines.next().unwrap();
@@ -354,7 +354,7 @@ fn logs_of_real_machines_are_taken_as_they_come() {
     let estimate = |r: &Value| r["parameters"][0]["estimate"].as_f64().unwrap();
     assert!((estimate(&result) - estimate(&reference)).abs() < 1e-9);
 
-    // Readings drop out, and the clock neither starts at zero nor ticks evenly.
+    // Some readings are missing, and the clock has an offset and irregular intervals.
     let ragged = altered(&clean, |i, column, cell| match column {
         "time" => (100.0 + number(cell) + if i % 2 == 1 { 0.0013 } else { 0.0 }).to_string(),
         "rod_pos.0" | "rod_quat.2" if i % 3 == 1 => String::new(),
@@ -366,7 +366,7 @@ fn logs_of_real_machines_are_taken_as_they_come() {
         "{result} {err}"
     );
 
-    // The rod drifts as no simulated one can.
+    // The rod drifts as no simulated rod can.
     let drifting = altered(&clean, |i, column, cell| match column {
         "rod_pos.2" => (number(cell) + 0.001 * i as f64).to_string(),
         _ => cell.to_owned(),
@@ -390,7 +390,7 @@ fn without_out_the_next_free_folder_is_taken() {
         names(&place.path("runs")),
         ["rod-balancing-solve-1", "rod-balancing-solve-2"]
     );
-    // An empty folder that is there is filled.
+    // An existing empty folder is used.
     std::fs::create_dir(place.path("empty")).unwrap();
     done(
         &place,
@@ -413,8 +413,8 @@ fn without_out_the_next_free_folder_is_taken() {
     );
 }
 
-/// A test run in the background of a shell ignores interrupts, and its children would too:
-/// `env` gives the signal its default meaning back.
+/// A test run in the background of a shell ignores interrupts, and so would its children. `env`
+/// restores the signal's default action.
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_run_leaves_nothing() {
@@ -439,8 +439,8 @@ fn an_interrupted_run_leaves_nothing() {
     assert!(place.names().is_empty(), "{:?}", place.names());
 }
 
-/// Episodes of all explorers are measured alike, so that they can be compared, and the report says so. A ball has no
-/// heading, and its path is drawn all the same.
+/// Episodes of all explorers are evaluated with the same measure, which the report names. The path
+/// of a ball is drawn even though it has no heading.
 #[test]
 fn a_report_names_the_explorers_objective_and_the_measure_apart() {
     let place = Workplace::new();

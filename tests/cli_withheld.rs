@@ -1,4 +1,4 @@
-//! `asid withheld` as the user runs it.
+//! `asid withheld` as users run it.
 
 #![allow(clippy::unwrap_used)]
 
@@ -17,7 +17,7 @@ fn said(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// A call on the cases of a folder, quietly.
+/// Runs `withheld --quiet` on the cases of a folder.
 fn withheld(cases: &Path, out: &Path, more: &[&str]) -> Output {
     let mut arguments = vec![
         "withheld",
@@ -36,14 +36,14 @@ fn labels_are_read_by_the_scorer_only_and_last() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
     write_study(&cases.join("case-0"), Truth::SensorBias(0.02));
-    // Without labels every case is answered and told before the scorer asks for them.
+    // Without labels every case is answered and reported before the scorer asks for them.
     let without = withheld(&cases, &out, &[]);
     assert_eq!(without.status.code(), Some(2));
     let lines = said(&without);
     let lines: Vec<&str> = lines.lines().collect();
     assert!(lines[0].contains("sensor-bias@x explains"), "{lines:?}");
     assert!(lines[1].contains("labels.json"), "{lines:?}");
-    // The answer is kept: with labels, wrong ones, nothing is answered anew, and nothing is right.
+    // The answer is kept: with wrong labels nothing is answered anew, and nothing is right.
     let labels = r#"{"case-0": {"world": "cart", "effects": ["actuator-delay@belt"], "parameters": {"mass": 1.3}}}"#;
     std::fs::write(cases.join("labels.json"), labels).unwrap();
     let with = withheld(&cases, &out, &[]);
@@ -54,7 +54,7 @@ fn labels_are_read_by_the_scorer_only_and_last() {
     );
     let result = json(&out.join("result.json"));
     assert_eq!((&result["right"], &result["cases"]), (&0.into(), &1.into()));
-    // What the process of the case was told names a study and no label.
+    // The arguments of the case's process name a study and no label.
     let run = json(&out.join("answers/diagnose/case-0/run.json"));
     let call: Vec<&str> = run["call"]
         .as_array()
@@ -82,7 +82,8 @@ fn labels_are_read_by_the_scorer_only_and_last() {
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     let page = page.trim_start_matches("<!DOCTYPE html>");
     assert!(roxmltree::Document::parse(page).is_ok() && page.contains("1 of 1 cases are right"));
-    // The decision is repeated with each of its numbers halved and doubled: a clear case stays as it is.
+    // The decision is repeated with each of its numbers halved and doubled: a clear case does not
+    // change.
     let again = withheld(&cases, &out, &["--labels", text(&sealed), "--sensitivity"]);
     assert!(again.status.success(), "{}", said(&again));
     let table = json(&out.join("sensitivity.json"));
@@ -123,7 +124,7 @@ fn a_case_over_the_limit_is_wrong_and_answered_again_with_a_longer_one() {
     assert!(longer.status.success(), "{}", said(&longer));
     let result = json(&out.join("result.json"));
     assert_eq!((&result["right"], &result["cases"]), (&1.into(), &2.into()));
-    // An error is told as the diagnosis told it.
+    // An error is reported as the diagnosis reported it.
     assert!(why(1).contains("train_0.csv"), "{}", why(1));
 }
 
@@ -160,7 +161,7 @@ fn shares_answer_and_the_call_without_one_scores() {
     assert_eq!(answered(), 3);
     call(&["--only-score"]);
     let result = json(&out.join("result.json"));
-    // Identification names nothing; the criterion sees that something is missing.
+    // Identification names nothing; the criterion (BIC) detects that something is missing.
     assert_eq!(result["method"], "identify-only");
     assert_eq!(result["right"], 0);
     let bic = &result["others"][0];
@@ -171,8 +172,8 @@ fn shares_answer_and_the_call_without_one_scores() {
     }
 }
 
-/// Symptom: folders of calls that were killed stayed among the answers for good. Cause: they were named by the number of their process, and
-/// only a call of the same number took them away.
+/// Symptom: folders of killed calls stay among the answers for good. Cause: their names are their
+/// process numbers, and only a call with the same number removes them.
 #[test]
 fn what_a_killed_call_leaves_among_the_answers_is_taken_away() {
     let folder = tempfile::tempdir().unwrap();
@@ -201,13 +202,13 @@ fn what_a_killed_call_leaves_among_the_answers_is_taken_away() {
 fn a_residual_network_closes_a_gap_and_names_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
-    // A reading that is shifted leaves the same residual in every row.
+    // A biased reading leaves the same residual in every row.
     write_study(&cases.join("a"), Truth::SensorBias(0.02));
     let labels = r#"{"a": {"effects": ["sensor-bias@x"]}}"#;
     std::fs::write(cases.join("labels.json"), labels).unwrap();
     let done = withheld(&cases, &out, &["--method", "residual-network"]);
     if !cfg!(feature = "torch") {
-        // One line says what to build with.
+        // One line says which feature to build with.
         let run = json(&out.join("answers/residual-network/a/run.json"));
         assert!(run.to_string().contains("--features torch"), "{run}");
         return;
@@ -219,7 +220,7 @@ fn a_residual_network_closes_a_gap_and_names_nothing() {
     assert_eq!(answer["verdict"], serde_json::json!([]));
     let gaps = &answer["physics"]["gaps"];
     let gap = |name: &str| gaps[name].as_f64().unwrap();
-    // Far below what the study's parameters leave.
+    // Far below the gap that the study's parameters leave.
     assert!(gap("refined") < 0.5 * gap("identified"), "{answer}");
 }
 
@@ -243,7 +244,8 @@ fn controls_fail_as_they_must() {
         (&scrambled["right"], &scrambled["control"]),
         (&0.into(), &"scrambled".into())
     );
-    // Without dry friction in the catalogue its case is unknown, or the same physics; never the effect itself.
+    // Without dry friction in the catalogue its case is unknown or has an equivalent name, but
+    // never the effect itself.
     let without = run(
         &["--control", "without-truth", "--case", "a"],
         "without-truth-result.json",
@@ -262,18 +264,18 @@ fn controls_fail_as_they_must() {
         "{}",
         noise["answers"]
     );
-    // Who knows the labels is right, and needs no answers.
+    // The oracle knows the labels, is right, and needs no answers.
     let alone = folder.path().join("oracle");
     let done = withheld(&cases, &alone, &["--control", "oracle"]);
     assert!(done.status.success(), "{}", said(&done));
     let oracle = json(&alone.join("oracle-result.json"));
     assert_eq!(oracle["right"], 2);
-    // Noise, and the two deviations that the model's step of 2 ms puts it off.
+    // Noise, and the two standard deviations of error of the model's step of 2 ms.
     let best = oracle["answers"][0]["physics"]["gaps"]["best"]
         .as_f64()
         .unwrap();
     assert!(best < 2.5, "{best}");
-    // The scores of the cases as they are stay.
+    // The scores of the unchanged cases stay.
     assert_eq!(json(&out.join("result.json"))["right"], 2);
 }
 
@@ -330,7 +332,7 @@ fn a_case_that_the_engine_cannot_simulate_is_left_out_with_the_reason() {
         "{why}"
     );
     assert_eq!(result["cases"], 0);
-    // Of a single study it is the answer.
+    // For a single study this is the answer.
     let study = cases.join("ball");
     let alone = asid(&["diagnose", text(&study), "--backend", "rapier", "--quiet"]);
     let line = String::from_utf8(alone.stderr.clone()).unwrap();

@@ -1,5 +1,5 @@
-//! Every registered engine against every conformance check, and the proof that
-//! the checks see a wrong engine.
+//! Every registered engine against every conformance check, and proof that the checks detect a
+//! faulty engine.
 //!
 //! `cargo test --features mujoco --test conformance -- --nocapture` prints the table.
 
@@ -35,7 +35,7 @@ fn engines() -> Vec<Box<dyn Backend>> {
     engines
 }
 
-/// An engine that loads nothing.
+/// An engine that refuses every scene.
 struct Refusing<'a>(&'a dyn Backend);
 
 impl Backend for Refusing<'_> {
@@ -59,7 +59,7 @@ impl Backend for Refusing<'_> {
     }
 }
 
-/// All rows of an engine, two checks at a time.
+/// All rows of an engine, with two checks at a time.
 fn rows(engine: &dyn Backend) -> Vec<Row> {
     let all: Vec<&Check> = checks().collect();
     run_checks(engine, &all, 2, &|_| {})
@@ -76,7 +76,7 @@ fn every_engine_conforms() {
     assert!(failures.is_empty(), "\n{}", table(&failures));
 }
 
-/// What small engines claim: mechanisms, driven mechanisms, free bodies.
+/// Capabilities of small engines: mechanisms, driven mechanisms, free bodies.
 const SMALL: [Capabilities; 3] = [
     Capabilities::ARTICULATION.union(Capabilities::EXACT_SNAPSHOT),
     Capabilities::ARTICULATION
@@ -88,7 +88,7 @@ const SMALL: [Capabilities; 3] = [
     Capabilities::FREE_BODIES.union(Capabilities::EXACT_SNAPSHOT),
 ];
 
-/// The bits that some check can see without a bit that is not there: what may be claimed.
+/// The claimed bits that some check tests without needing an unclaimed bit, or that no check needs.
 fn checkable(claimed: Capabilities) -> Capabilities {
     let seen = |bit: &Capabilities| {
         let mut of = checks().filter(|c| c.needs.contains(*bit)).peekable();
@@ -99,11 +99,11 @@ fn checkable(claimed: Capabilities) -> Capabilities {
 
 #[test]
 fn no_check_needs_more_than_it_names() {
-    // An engine that refuses whatever it does not claim passes what is left.
+    // An engine that refuses whatever it does not claim passes the remaining checks.
     let engine = engines().swap_remove(0);
     let all = engine.capabilities();
     let mut failures = Vec::new();
-    // Precision is not for the taking: tolerances follow from it.
+    // Precision cannot be removed, because tolerances depend on it.
     let bits = (all - Capabilities::DOUBLE_PRECISION).iter();
     let without = bits.map(|bit| checkable(all - bit));
     for bits in without.chain(SMALL) {
@@ -124,7 +124,7 @@ fn no_check_needs_more_than_it_names() {
     assert!(failures.is_empty(), "\n{}", table(&failures));
 }
 
-/// Faults that no check sees in an engine that is sound otherwise.
+/// Faults that no check detects in an otherwise correct engine.
 fn missed(engine: &dyn Backend, faults: impl Iterator<Item = Fault>) -> Vec<Fault> {
     let sound: Vec<&Check> = (checks().zip(rows(engine)))
         .filter(|(_, row)| row.outcome == Outcome::Pass)
@@ -148,7 +148,7 @@ fn missed(engine: &dyn Backend, faults: impl Iterator<Item = Fault>) -> Vec<Faul
 
 #[test]
 fn faults_of_a_whole_engine_are_caught() {
-    // Which engine is spoilt does not matter; one that is right is enough.
+    // Any engine serves for this test, and one correct engine is enough.
     let engine = engines().swap_remove(0);
     let faults = Fault::ALL.into_iter().filter(|f| f.of_a_whole_engine());
     let missed = missed(&*engine, faults);
@@ -157,7 +157,7 @@ fn faults_of_a_whole_engine_are_caught() {
 
 #[test]
 fn faults_of_a_mechanism_are_caught() {
-    // A small engine is asked no less about what it does.
+    // A small engine gets the same checks of what it supports.
     let engine = engines().swap_remove(0);
     let bits = Capabilities::all()
         - Capabilities::CONTACT
@@ -196,7 +196,7 @@ fn a_more_accurate_integrator_conforms() {
     assert!(failures.is_empty(), "\n{}", table(&failures));
 }
 
-/// A row of an engine that claims some bits and no others.
+/// A row of an engine that claims `bits` and no others.
 fn row(bits: Capabilities, check: &str) -> Row {
     let engine = engines().swap_remove(0);
     let check = checks().find(|c| c.name == check).unwrap();
@@ -212,7 +212,7 @@ fn an_engine_that_claims_no_motion_fails() {
     assert_eq!(failed.len(), 1, "{}", table(&rows));
     assert_eq!(failed[0].check, "claims/something-moves");
     assert!(failed[0].note.starts_with("claims neither FREE_BODIES"));
-    // What may be asked of anything is asked.
+    // Checks without required capabilities still run.
     let faults = rows.iter().filter(|row| row.family() == "faults");
     assert!(faults.filter(|r| r.outcome == Outcome::Pass).count() >= 6);
 }
@@ -245,7 +245,7 @@ fn a_refused_scene_is_named_by_its_check() {
 #[test]
 fn rows_survive_json_and_threads() {
     let engine = engines().swap_remove(0);
-    // As many at a time as there may be: the rows are the same, in the same order.
+    // With as many at a time as there may be, the rows and their order are the same.
     let all: Vec<&Check> = checks().take(20).collect();
     let one = run_checks(&*engine, &all, 1, &|_| {});
     assert_eq!(one, run_checks(&*engine, &all, 8, &|_| {}));

@@ -1,4 +1,4 @@
-//! A motion that was designed tells simulated true machines better than one that was not.
+//! A designed motion identifies simulated true machines better than one without design.
 
 #![cfg(feature = "mujoco")]
 #![allow(clippy::unwrap_used)]
@@ -11,7 +11,7 @@ use asid::core::progress::Silent;
 use asid::sysid::fit::{fit, smooth};
 use asid::sysid::method::Method;
 
-/// A cart on a rail, and a pole that hangs from it.
+/// A cart on a rail with a hanging pole.
 const CART: &str = r#"<mujoco model="hanging">
   <option timestep="0.005"/>
   <worldbody>
@@ -50,14 +50,15 @@ population = 24
 iterations = 12
 "#;
 
-/// True machines that play each motion.
+/// Number of true machines that play each motion.
 const WORLDS: u64 = 6;
 
 fn root_mean_square(x: &[f64]) -> f64 {
     (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
 }
 
-/// A model and the settings of a motion as files in a folder: the model's path, and what was read.
+/// Writes a model and the settings of a motion into a folder; returns the model's path and the
+/// settings as read.
 fn written(folder: &Path, model: &str, settings: &str) -> (PathBuf, MotionConfig) {
     let (xml, toml) = (folder.join("model.xml"), folder.join("motion.toml"));
     std::fs::write(&xml, model).unwrap();
@@ -66,8 +67,9 @@ fn written(folder: &Path, model: &str, settings: &str) -> (PathBuf, MotionConfig
     (xml, config)
 }
 
-/// Expected and actual deviations of a method's motion, in deviations of the prior, root mean squares over unknowns and
-/// machines; no machine may break a limit.
+/// Expected and actual standard deviations of a method's motion, relative to those of the prior.
+///
+/// They are root mean squares over unknowns and machines. No machine may exceed a limit.
 fn deviations(folder: &Path, method: Method) -> [f64; 2] {
     let (model, config) = written(folder, CART, SETTINGS);
     let subject = Subject::open(&model, Some("mujoco")).unwrap();
@@ -95,7 +97,8 @@ fn a_designed_motion_beats_a_multisine_in_true_machines() {
     let [baseline, baseline_actual] = deviations(folder.path(), Method::Multisine);
     assert!(expected < 0.7 * baseline, "{expected} {baseline}");
     assert!(actual < baseline_actual, "{actual} {baseline_actual}");
-    // Twenty-four errors give a deviation to 14 %; the machines lie all over the ranges, where a motion tells more or less.
+    // Twenty-four errors give a standard deviation to 14 %. The machines are anywhere in the
+    // ranges, where a motion is more or less informative.
     assert!(
         (0.4..2.5).contains(&(actual / expected)),
         "{actual} {expected}"
@@ -104,7 +107,7 @@ fn a_designed_motion_beats_a_multisine_in_true_machines() {
     assert!((0.4..2.5).contains(&ratio), "{baseline_actual} {baseline}");
 }
 
-/// A servo that dry friction holds, and one beside it that may only creep.
+/// A servo that dry friction holds, and one beside it that may only move slowly.
 const HELD: &str = r#"<mujoco model="held">
   <option timestep="0.005" gravity="0 0 0"/>
   <worldbody>
@@ -124,7 +127,7 @@ const HELD: &str = r#"<mujoco model="held">
   <sensor><jointpos name="q" joint="held"/></sensor>
 </mujoco>"#;
 
-/// What a motion of it is designed for.
+/// Settings of a motion for that machine.
 const HELD_SETTINGS: &str = r#"
 seconds = 2.0
 period = 0.02
@@ -140,8 +143,11 @@ population = 16
 iterations = 8
 "#;
 
-/// The servo of stiffness `k` slips where its command is `F / k` = 0.05 m away, and then follows at that distance: one reading of the
-/// noise 1 mm tells the friction `F` to 0.2 N. The other, at the same share of its range, may go a few millimetres only.
+/// The servo of stiffness `k` slips when its command is `F / k` = 0.05 m away, and then follows at
+/// that distance.
+///
+/// One reading with 1 mm of noise therefore determines the friction `F` to 0.2 N. The other servo,
+/// at the same share of its range, may move only a few millimetres.
 #[test]
 fn a_joint_that_dry_friction_holds_is_made_to_slip() {
     let folder = tempfile::tempdir().unwrap();
@@ -157,7 +163,8 @@ fn a_joint_that_dry_friction_holds_is_made_to_slip() {
     assert!(found < of_one_reading, "{found} {of_one_reading}");
 }
 
-/// rapier has no target `joint/NAME/range`, so that a range that is asked of the engine is silently none: a motion then leaves the range.
+/// rapier has no target `joint/NAME/range`. If the engine is asked for the range, there silently is
+/// none, and a motion leaves the range.
 #[test]
 fn a_motion_keeps_the_ranges_of_joints_on_every_engine() {
     let folder = tempfile::tempdir().unwrap();
@@ -166,7 +173,7 @@ fn a_motion_keeps_the_ranges_of_joints_on_every_engine() {
         let subject = Subject::open(&model, Some(engine)).unwrap();
         let setup = MotionSetup::new(&subject, &config, 2).unwrap();
         let joints = &setup.player.limits().joints;
-        // Two hundredths of 3 m are kept free at either end.
+        // Two hundredths of the range of 3 m are kept free at each end.
         let [low, high] = joints[0].position.unwrap();
         assert!(
             (low + 1.44).abs() < 1e-12 && (high - 1.44).abs() < 1e-12,

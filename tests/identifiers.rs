@@ -1,5 +1,7 @@
-//! Identifiers on a cart of unknown mass, where posterior, expected deviation and what the data cannot
-//! tell are known: `x = x_0 + C / m` with the start co-estimated.
+//! Identifiers on a cart of unknown mass.
+//!
+//! With `x = x_0 + C / m` and the initial position co-estimated, the posterior, the expected
+//! standard deviation and what the data cannot determine are known.
 
 #![allow(clippy::unwrap_used)]
 
@@ -32,14 +34,14 @@ impl Policy for Push {
     }
 }
 
-/// The posterior of an episode under a force, and the deviation that is expected of the mass.
+/// The posterior of an episode under a force, and the expected standard deviation of the mass.
 fn identified(name: &str, force: f64, mass: f64, seed: u64) -> (Identified, f64) {
     let entry = find::<IdentifierEntry>(name).unwrap();
     let settings = (entry.defaults)();
     identified_late((name, settings), force, mass, seed, 0.0)
 }
 
-/// The same by an identifier with these settings, of a tracker that is late (s).
+/// The same for an identifier with given settings and a tracker with a latency, s.
 fn identified_late(
     (name, settings): (&str, Settings),
     force: f64,
@@ -131,7 +133,7 @@ fn a_truth_a_little_outside_of_the_prior_is_found_and_the_result_says_where_it_w
 
 #[test]
 fn a_late_tracker_does_not_make_the_mass_certain_and_wrong() {
-    // Seen 15 ms late, a cart that is pushed for 0.2 s has gone a seventh less far.
+    // Read 15 ms late, a cart that is pushed for 0.2 s seems to have moved a seventh less.
     let (mass, latency) = (1.1, 0.015);
     for name in IDENTIFIERS {
         let entry = find::<IdentifierEntry>(name).unwrap();
@@ -139,7 +141,7 @@ fn a_late_tracker_does_not_make_the_mass_certain_and_wrong() {
             let mut settings = (entry.defaults)();
             let prior = toml::Table::from_iter([("latency".to_owned(), prior.into())]);
             settings.insert("tracker".into(), toml::Value::Table(prior));
-            // What an unaware one leaves no other search would mend.
+            // No further search would correct what an identifier without latency leaves.
             if settings.contains_key("restarts") {
                 settings.insert("restarts".into(), 0.into());
             }
@@ -180,7 +182,7 @@ fn a_cart_that_is_not_pushed_has_no_mass_that_shows() {
         found.posterior.unseen[0].weights,
         [("mass".to_owned(), 1.0)]
     );
-    // What is believed is the prior: uniform on 0.5 to 2 kg.
+    // The posterior is the prior: uniform on 0.5 to 2 kg.
     assert!(
         (m.estimate - 1.25).abs() < 0.1 && (m.std / 0.433 - 1.0).abs() < 0.1,
         "{m:?}"

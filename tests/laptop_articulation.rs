@@ -1,5 +1,5 @@
-//! The laptop's physics on every engine that is built in: what identification and the task
-//! rely on, without any learning.
+//! The laptop's physics on every built-in engine: what identification and the task rely on, without
+//! any learning.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
@@ -21,7 +21,8 @@ fn on_every_engine(check: impl Fn(&str, &Problem<'_>)) {
     task_support::on_every_engine("laptop-articulation", 0, check);
 }
 
-/// Readings of attempts with these (articulated, offset, reach), from the middle of the start range.
+/// Readings of attempts with these (articulated, offset, reach), from the middle of the start
+/// range.
 fn attempts(problem: &Problem<'_>, cases: &[[f64; 3]]) -> Vec<Vec<f64>> {
     let protocol = problem.task.downstream();
     let start: Vec<f64> = protocol.start.iter().map(|c| c.center()).collect();
@@ -56,12 +57,12 @@ fn attempts(problem: &Problem<'_>, cases: &[[f64; 3]]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Base's pose in the plane and the lid's angle at the end.
+/// The base's pose in the plane and the lid's angle at the end.
 fn end(problem: &Problem<'_>, readings: &[f64]) -> Vec<f64> {
     problem.task.locate(&readings[readings.len() - 14..])
 }
 
-/// The log of readings alone.
+/// A log that has only readings.
 fn log(problem: &Problem<'_>, readings: &[f64]) -> Episode {
     Episode {
         time: (0..readings.len() / 14).map(|k| k as f64 * 0.02).collect(),
@@ -79,13 +80,13 @@ fn log(problem: &Problem<'_>, readings: &[f64]) -> Episode {
 #[test]
 fn the_hand_that_closes_the_lid_must_know_the_axis_and_cannot_move_a_rigid_one() {
     on_every_engine(|engine, problem| {
-        // By geometry: the same line of touch, turned about an axis 20 mm lower or higher.
+        // By geometry: the same line of contact, rotated about an axis 20 mm lower or higher.
         let good = [[1.0, -0.02, 0.087], [1.0, 0.0, 0.06], [1.0, 0.02, 0.036]];
         let readings = attempts(problem, &[good, good.map(|c| [0.0, c[1], c[2]])].concat());
         for (case, r) in good.iter().zip(&readings[..3]) {
             let outcome = problem.task.outcome(r);
             assert!(outcome.success, "{engine} {case:?}: {outcome:?}");
-            // 0.3 N m at 0.1 m is 3 N; the base holds 12 N.
+            // 0.3 N m at 0.1 m is 3 N; friction holds the base up to 12 N.
             let base = end(problem, r);
             assert!((base[0] - 0.6).abs() < 0.003, "{engine} {case:?}: {base:?}");
             let found = articulation::of_episodes(
@@ -103,8 +104,8 @@ fn the_hand_that_closes_the_lid_must_know_the_axis_and_cannot_move_a_rigid_one()
         }
         for (case, r) in good.iter().zip(&readings[3..]) {
             let (last, outcome) = (end(problem, r), problem.task.outcome(r));
-            // Pushed along as a whole, by as much as the hand's way; what the dry friction lets
-            // the lid creep is below the noise of one reading, 10 mrad.
+            // The laptop is pushed as a whole, as far as the hand moves. Dry friction lets the lid
+            // creep by less than the noise of one reading, 10 mrad.
             assert!(last[0] > 0.66, "{engine} {case:?}: {last:?}");
             assert!((last[3] - 1.8).abs() < 0.01, "{engine} {case:?}: {last:?}");
             assert!(!outcome.success);
@@ -166,7 +167,7 @@ fn an_episode_without_contact_leaves_the_question_open() {
         batch.place(problem.task, &[0], &start).unwrap();
         let mut row = vec![0.0; recording.width()];
         batch.simulator.read(&[0], &recording, &mut row).unwrap();
-        // A few noisy looks at a laptop that nobody touches.
+        // A few noisy readings of a laptop that nobody touches.
         let signals = SignalSet::new(layout, problem.signals).unwrap();
         let mut rng = problem.streams.stream("noise");
         let readings: Vec<f64> = (0..6)
@@ -184,7 +185,7 @@ fn an_episode_without_contact_leaves_the_question_open() {
         let settings = "population = 16\niterations = 3".parse().unwrap();
         let identifier = (find::<IdentifierEntry>("reps").unwrap().make)(&settings).unwrap();
         let found = identifier.identify(problem, &[episode]).unwrap();
-        // Even odds but for what the Metropolis walks' 1000 samples leave open.
+        // Even odds, up to the uncertainty of 1000 samples of the Metropolis walks.
         let [articulated, offset] = &found.posterior.marginals[..] else {
             panic!("two unknowns");
         };
@@ -194,8 +195,8 @@ fn an_episode_without_contact_leaves_the_question_open() {
     });
 }
 
-/// Interaction is the hand's contact with the lid. A random explorer's can be counted like any other's:
-/// it meets the lid in some episodes and misses it in most.
+/// Interaction is the hand's contact with the lid. That of a random explorer is counted like any
+/// other's: it touches the lid in some episodes and misses it in most.
 #[test]
 fn interaction_of_random_motion_with_the_lid_can_be_counted() {
     const EPISODES: u64 = 12;
@@ -219,7 +220,7 @@ fn interaction_of_random_motion_with_the_lid_can_be_counted() {
             )
             .unwrap();
             let real = world.explore(&mut *explored.policy).unwrap();
-            // Of base and lid by themselves; the lid's is the task's.
+            // Contact of base and lid separately; the lid's is the task's.
             assert_eq!(real.touched.len(), 2);
             assert_eq!(real.contact_fraction, real.touched[1]);
             interacted += u64::from(real.contact_fraction > 0.0);

@@ -1,5 +1,5 @@
-//! Methods from end to end, on a cart whose mass has to be known: what an episode tells decides how near to
-//! the goal the cart comes.
+//! Methods from end to end, on a cart whose mass must be known: the information of an episode
+//! decides how close to the goal the cart comes.
 
 #![allow(clippy::unwrap_used)]
 
@@ -20,20 +20,21 @@ use asid_comparison::method::Method as Named;
 use asid_statistics::interquartile_mean;
 use cart_support::Cart;
 
-/// Runs of each method.
+/// Number of runs of each method.
 const SEEDS: u64 = 6;
 
-/// A search that ends within a few hundredths of the force that is best: what remains is what the mass is
-/// off.
+/// A search that ends within a few hundredths of the best force. The remaining error is that of the
+/// mass.
 const SOLVER: &str = "iterations = 6\npopulation = 12\nbelief_samples = 2";
 
-/// Error of the mass over the prior's deviation, and distance from the goal in m, of one run.
+/// Relative error of the mass, in standard deviations of the prior, and distance from the goal, m,
+/// of one run.
 fn run(name: &str, seed: u64) -> [f64; 2] {
     let method = Named::named(name).unwrap();
     let task = Cart::new();
     let parameters: [Parameter; 1] = [Cart::mass(Scale::Log)];
     let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
-    // Truth, start and noise are of the seed, whatever the method.
+    // Truth, initial state and noise depend on the seed, whatever the method.
     let streams = Streams::new(seed).child("world");
     let truth = [parameters[0].sample(&mut streams.stream("truth"))];
     let mut out = [f64::NAN; 2];
@@ -71,9 +72,11 @@ fn run(name: &str, seed: u64) -> [f64; 2] {
     out
 }
 
-/// Pushed with all it has for the whole episode, the cart moves by `C / m` with the largest `C` there is;
-/// random forces cancel each other to about `1 / sqrt(10)` of it; without an episode the mass is that
-/// of the prior, of which the range is a factor of four. Masses and distances from the goal follow.
+/// Errors of the mass and of the goal follow from the information of the episode.
+///
+/// Under the largest force throughout the episode the cart moves by `C / m` with the largest
+/// possible `C`. Random forces largely cancel, to about `1 / sqrt(10)` of it. Without an episode
+/// the mass is that of the prior, with a range of a factor of four.
 #[test]
 fn what_is_explored_for_information_beats_random_actions_and_these_beat_no_episode() {
     let of = |name: &str| {

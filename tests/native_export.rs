@@ -1,4 +1,4 @@
-//! Effects as MJCF's own elements: the exported document moves as the refined model does.
+//! Effects as MJCF's own elements: the exported document moves like the refined model.
 
 #![cfg(feature = "mujoco")]
 #![allow(clippy::unwrap_used)]
@@ -8,7 +8,7 @@ use asid::core::{Backend, BatchConfig, Control, Model, Rollout, Scene};
 use asid::effects::native::{PlainModel, plain};
 use asid::effects::{EffectSpec, Native, RefinedModel};
 
-/// Two links with a motor and a servo, in degrees and with a class, and a keyframe.
+/// Two links with a motor and a servo, with angles in degrees, a class and a keyframe.
 const ARM: &str = r#"<mujoco><compiler angle="degree"/><option timestep="0.002" integrator="implicitfast"/>
   <default><default class="link"><joint damping="0.05" armature="0.01"/><geom type="capsule" size="0.02"/></default></default>
   <worldbody><frame pos="0 0 1"><body name="upper"><joint class="link" name="shoulder" axis="0 1 0" range="-170 170"/>
@@ -33,7 +33,7 @@ fn engine() -> Box<dyn Backend> {
     (find::<BackendEntry>("mujoco").unwrap().make)().unwrap()
 }
 
-/// All sensors over a second of moving commands.
+/// All sensors over one second of varying commands.
 fn run(model: &dyn Model, qvel: &[f64]) -> Vec<f64> {
     let layout = model.layout();
     let config = BatchConfig {
@@ -50,7 +50,7 @@ fn run(model: &dyn Model, qvel: &[f64]) -> Vec<f64> {
     let names: Vec<&str> = layout.sensors.iter().map(|s| &*s.name).collect();
     let record = layout.recording(&names).unwrap();
     let frames = 500;
-    // The servo begins where its joint stands, so that nothing between them is stretched.
+    // The servo begins at its joint's position, so that nothing between them is stretched.
     let command = |k: usize, a: usize| match a {
         0 => 0.9 * (0.02 * k as f64).cos(),
         _ => 0.9 * (0.02 * k as f64).sin() - 0.4,
@@ -62,7 +62,7 @@ fn run(model: &dyn Model, qvel: &[f64]) -> Vec<f64> {
     let rollout = Rollout::new(&[0], frames, 1, Control::Shared(&control), &record);
     simulator.rollout(&rollout, &mut out).unwrap();
     assert!(out.iter().all(|x| x.is_finite()));
-    // The first 20 ms are histories of delayed sensors, which begin at zero in MuJoCo.
+    // Drops the first 20 ms: histories of delayed sensors, which begin at zero in MuJoCo.
     out.split_off(10 * record.width())
 }
 
@@ -84,8 +84,10 @@ fn exported(model: &RefinedModel) -> PlainModel {
     plain(&*engine(), model, std::path::Path::new("")).unwrap()
 }
 
-/// Distances (root mean square, and the largest) of the refined model's readings from those of the exported document, and from those of the
-/// document without anything.
+/// Distances (root mean square, and largest) of the refined model's readings from those of two
+/// documents.
+///
+/// The first is the exported document, the second the document without any effect.
 fn distances(model: &RefinedModel, qvel: &[f64]) -> ([f64; 2], [f64; 2]) {
     let backend = engine();
     let written = exported(model);
@@ -110,7 +112,8 @@ fn distances(model: &RefinedModel, qvel: &[f64]) -> ([f64; 2], [f64; 2]) {
     (far(of(&scene)), far(of(&model.scene)))
 }
 
-/// The same numbers in the same engine: what is left is rounding, over a second of an arm that swings freely.
+/// Tolerance for the same numbers in the same engine: rounding over one second of a freely swinging
+/// arm.
 const EXACT: f64 = 1e-7;
 
 #[test]
@@ -145,23 +148,24 @@ fn effects_that_are_values_or_gains_move_the_same() {
     }
 }
 
-/// Laws that MuJoCo integrates in its own way: the document takes most of the difference away (root mean
-/// squares of all readings).
+/// Laws that MuJoCo integrates in its own way. The document removes most of the difference (root
+/// mean squares of all readings).
 #[test]
 fn effects_with_another_law_move_nearly_the_same() {
     for (effect, share) in [
-        // A limit that is computed at the start of a step or within it.
+        // A limit that is evaluated at the start of a step or within it.
         ("actuator-saturation@push:limit=1.1", 1e-3),
         ("actuator-saturation@hold:limit=0.9", 0.02),
-        // The mean over a step or its start: half a step of a lag of 50.
+        // The mean over a step or its start: half a step of a lag of 50 steps.
         ("actuator-lag@push:time_constant=0.1", 0.02),
         ("actuator-lag@hold:time_constant=0.1", 0.02),
-        // A soft constraint for a rigid law: speeds differ where the joint stops, for some steps.
+        // A soft constraint for a rigid law: speeds differ for some steps where the joint stops.
         ("coulomb-friction@shoulder:force=0.4", 0.15),
         ("sensor-delay@q1:delay=0.02", 0.02),
-        // Ends of a gap that are springs of two time steps: speeds differ at an impact.
+        // The ends of the gap are springs of two time steps: speeds differ at an impact.
         ("backlash@elbow:width=0.1", 0.5),
-        // The trapezoidal rule, or MuJoCo's symplectic Euler: periods differ by an eighth of the square of a step's phase.
+        // The trapezoidal rule, or MuJoCo's symplectic Euler: periods differ by an eighth of the
+        // square of a step's phase.
         ("joint-compliance@elbow:compliance=0.05", 0.01),
     ] {
         let ([left, _], [without, _]) = distances(&refined(ARM, &[], &[effect]), &[]);
@@ -184,7 +188,7 @@ fn friction_and_softness_of_contacts_move_the_same() {
     }
 }
 
-/// Effects at one place, and values of the study, are written together.
+/// Effects at one site, and values of the study, are exported together.
 #[test]
 fn several_effects_compose() {
     let values = [
@@ -228,7 +232,7 @@ fn what_mjcf_cannot_say_is_told_in_a_sentence() {
     assert_eq!(written.xml, ARM);
 }
 
-/// What is not touched stays as its author wrote it.
+/// What is not changed stays as its author wrote it.
 #[test]
 fn the_rest_of_the_document_stays() {
     let model = refined(ARM, &[("joint/elbow/damping", 0.5)], &[]);
@@ -274,7 +278,7 @@ fn meshes_and_includes_are_found_from_another_folder() {
             .unwrap(),
         0.02
     );
-    // Nothing ties it to this machine: the folders may move together.
+    // Nothing refers to this machine's paths, so the folders can move together.
     assert!(
         !written.xml.contains(folder.path().to_str().unwrap()),
         "{}",

@@ -1,4 +1,4 @@
-//! No number without a reason: every constant of the crates says what it is.
+//! No number without a reason: every constant of the crates has a comment.
 
 #![allow(clippy::unwrap_used)]
 
@@ -8,7 +8,8 @@ use std::fs;
 
 use source_support::{root, sources, untested};
 
-/// Folders of the crates whose numbers are looked at. The C ABI's are those of its header, which explains them.
+/// Folders of the crates whose numbers are checked. The C ABI's numbers are those of its header,
+/// which explains them.
 const CRATES: [&str; 18] = [
     "asid-core",
     "diagnosis",
@@ -30,13 +31,13 @@ const CRATES: [&str; 18] = [
     "src",
 ];
 
-/// Words of documentation that a number has at least: what it is, and its unit.
+/// Smallest number of words in a constant's comment: what it is, and its unit.
 const FEWEST_WORDS: usize = 3;
 
-/// Types of numbers.
+/// Numeric types.
 const TYPES: [&str; 5] = ["f64", "f32", "usize", "u64", "u32"];
 
-/// Names of the numeric constants of a text that say too little of themselves.
+/// Names of the numeric constants of a text with too few words of comment.
 fn unexplained(text: &str) -> Vec<String> {
     let lines: Vec<&str> = untested(text).lines().map(str::trim).collect();
     let mut found = Vec::new();

@@ -1,5 +1,5 @@
-//! What crosses the border to a plugin: each method of a trait, those with a default too. A default that answered for the
-//! other side would hide what the other side says.
+//! Each method of a trait crosses the border to a plugin, including those with a default. A default
+//! that answers for the other side would hide the other side's answer.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -10,7 +10,8 @@ fn source(path: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Names of the methods in the block that a line begins which starts with one of these, at the first level of indentation.
+/// Names of the methods at the first level of indentation, in the first block whose line starts
+/// with `begins`.
 fn methods(text: &str, begins: &str) -> BTreeSet<String> {
     let block = text.lines().skip_while(|l| !l.starts_with(begins));
     let lines = block.skip(1).take_while(|l| *l != "}");

@@ -1,5 +1,5 @@
-//! Engines in C: the examples are built by the system's compiler and conform, the guide
-//! leads to a green table, and its code is that of the examples.
+//! Engines in C: the system's compiler builds the examples, they conform, and the guide's code is
+//! that of the examples.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
@@ -16,7 +16,7 @@ use asid_conformance::{Outcome, Row, table};
 use cli_support::{Workplace, names};
 use serde_json::Value;
 
-/// What the examples promise to compile under without a warning.
+/// Flags under which the examples compile without a warning.
 const STRICT: [&str; 6] = [
     "-std=c99",
     "-Wall",
@@ -39,7 +39,7 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(repository(path)).unwrap()
 }
 
-/// Compiles sources of a folder of the repository into a library.
+/// Compiles sources in a folder of the repository into a library.
 fn build(folder: &str, sources: &[&str], library: &Path) {
     let sources = sources.iter().map(|s| repository(folder).join(s));
     let output = Command::new(compiler())
@@ -61,7 +61,7 @@ fn engine(library: &Path) -> Box<dyn Backend> {
     engine.backend(engine.name())
 }
 
-/// Runs all checks; gives how many passed.
+/// Runs all checks; returns how many passed.
 fn conforms(backend: &dyn Backend) -> usize {
     let rows = asid_conformance::run(backend);
     let failures: Vec<Row> = rows.iter().filter(|r| r.is_failure()).cloned().collect();
@@ -94,7 +94,8 @@ fn the_engine_of_mechanisms_conforms() {
     assert!(conforms(&*engine) > 110);
 }
 
-/// Readings after `steps` frames of one step from rest, at a command of 1, with parameters.
+/// Readings after `steps` frames of one step each, from rest with a command of 1 and these
+/// parameters.
 fn readings(
     engine: &dyn Backend,
     inside: &str,
@@ -135,7 +136,8 @@ fn principal_axes_may_be_turned() {
     build("plugins/engine-c", &["engine.c"], &flight);
     let sources = ["engine.c", "scene.c", "dynamics.c"];
     build("plugins/mechanism-c", &sources, &mechanism);
-    // The first principal axis is (1, 1, 0) of the body: half of a right angle about z.
+    // The first principal axis is (1, 1, 0) of the body. The quaternion is half of the right angle
+    // about z, an eighth of a turn.
     let (c, s) = (
         std::f64::consts::FRAC_PI_8.cos(),
         std::f64::consts::FRAC_PI_8.sin(),
@@ -154,14 +156,14 @@ fn principal_axes_may_be_turned() {
         let free = body(r#"<freejoint name="j"/>"#);
         let found = readings(&*engine, &free, &["axes", "own"], &[], 5).unwrap();
         assert!(close(&found, &still), "{}: {found:?}", engine.name());
-        // About a principal axis it goes on turning; about another one it would tumble.
+        // About a principal axis it keeps rotating; about another axis it would tumble.
         let turning =
             free.clone() + r#"<keyframe><key qpos="0 0 0 1 0 0 0" qvel="0 0 0 1 1 0"/></keyframe>"#;
         let found = readings(&*engine, &turning, &["qvel.j"], &[], 50).unwrap();
         let kept = close(&found, &[0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
         assert!(kept, "{}: {found:?}", engine.name());
     }
-    // 20 steps of 0.01 s at 1 N m: the rate is 0.2 over the moment about the hinge.
+    // 20 steps of 0.01 s with 1 N m: the rate is 0.2 over the moment of inertia about the hinge.
     let engine = engine(&mechanism);
     let wheel =
         body(r#"<joint name="j" axis="1 1 0"/>"#) + r#"<actuator><motor joint="j"/></actuator>"#;
@@ -251,7 +253,7 @@ fn a_task_runs_on_an_engine_in_c_as_on_another() {
     let mut arguments = vec!["run", "payload-swing", "--seed", "1", "--quiet"];
     arguments.extend(["--set", "condition=\"light\""]);
     arguments.extend(["--out", "out", "--backend", "mechanism"]);
-    // The truth is a world of another engine, so both must be right.
+    // The truth is a world of another engine, so both engines must be right.
     arguments.extend(["--real-backend", "rapier"]);
     for plugin in [&task, &library] {
         arguments.extend(["--plugin", plugin.to_str().unwrap()]);
@@ -263,7 +265,7 @@ fn a_task_runs_on_an_engine_in_c_as_on_another() {
     assert_eq!(result["versions"]["engine"], "mechanism 1.0");
     let mass = &result["parameters"][0];
     let error = mass["estimate"].as_f64().unwrap() - mass["truth"].as_f64().unwrap();
-    // 0.01 rad of noise leave 1.4 g of deviation; three times that.
+    // 0.01 rad of noise leave a standard deviation of 1.4 g; the bound is three times that.
     assert!(error.abs() < 4.2e-3, "{mass}");
     assert_eq!(result["downstream"]["success"], true, "{result}");
 }
@@ -313,7 +315,7 @@ fn code_of_the_guide_is_that_of_the_examples() {
     let engine = read("plugins/engine-c/engine.c");
     let (quoted, new): (Vec<_>, Vec<_>) = blocks("c").into_iter().partition(|b| engine.contains(b));
     assert!(quoted.len() > 10, "{new:?}");
-    // What is not quoted must compile beside the rest.
+    // Code that is not quoted must compile together with the rest.
     let place = Workplace::new();
     place.write("guide.c", &(engine + &new.join("\n")));
     let output = Command::new(compiler())
@@ -325,7 +327,7 @@ fn code_of_the_guide_is_that_of_the_examples() {
         .unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.is_empty(), "{said}");
-    // Rust code is built and run where it stands.
+    // Rust code is built and run where it is.
     let sources = [
         "plugins/engine-rust/src/lib.rs",
         "plugins/own-binary/src/main.rs",
@@ -345,7 +347,7 @@ fn new_writes_what_can_be_built_and_nothing_over_anything() {
         let dir = format!("deep/{kind}-of-mine");
         let output = place.run(&["new", kind, &dir]);
         assert!(output.status.success(), "{output:?}");
-        // The compile line of its README, as it is written.
+        // The compile command of its README, as written there.
         let readme = place.read(&format!("{dir}/README.md"));
         let line = readme.lines().find(|l| l.starts_with("cc ")).unwrap();
         let line = line.replacen("cc", &compiler(), 1);

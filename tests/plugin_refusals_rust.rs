@@ -1,5 +1,5 @@
-//! Wrong plugins, each really built: one line that names the file and the reason, and an
-//! exit status that tells. Nothing takes the program down.
+//! Faulty plugins, each actually built: one line names the file and the reason, and the exit status
+//! tells. No plugin crashes the program.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
@@ -14,11 +14,11 @@ use std::sync::LazyLock;
 
 use cli_support::Workplace;
 
-/// The task of the examples, and the plugin of which every part fails.
+/// The task of the examples, and the plugin with only failing parts.
 static LIBRARIES: LazyLock<Vec<PathBuf>> =
     LazyLock::new(|| plugin_support::build(&["payload-swing", "faulty-plugin"]));
 
-/// Settings under which all but the explorer are quick.
+/// Settings under which everything but the explorer is quick.
 const TINY: [&str; 14] = [
     "--set",
     "identifier.iterations=1",
@@ -36,7 +36,7 @@ const TINY: [&str; 14] = [
     "solver.belief_samples=1",
 ];
 
-/// The one line that a command says on standard error, and its exit status.
+/// The one line on standard error of a command, and its exit status.
 fn line(output: &Output) -> (String, Option<i32>) {
     let said = String::from_utf8_lossy(&output.stderr)
         .trim_end()
@@ -160,7 +160,7 @@ fn an_effects_failures_end_as_one_line() {
 #[test]
 fn whoever_panics_is_blamed() {
     let explorer = ["--explorer", "explore-makes-the-task-panic"];
-    // The task of another plugin, through this program.
+    // The task of another plugin, called through this program.
     let (said, status) = run(&[&["payload-swing"], &explorer[..]].concat());
     assert!(
         said.contains("libpayload_swing") && said.contains("panicked: index out of bounds"),
@@ -252,7 +252,7 @@ fn what_was_built_otherwise_is_refused_before_it_is_used() {
 #[test]
 fn the_sources_must_be_the_same_too() {
     let place = Workplace::new();
-    // A real plugin, of which one digit of the sources' hash is another.
+    // A real plugin with one changed digit in the hash of the sources.
     let mut bytes = std::fs::read(&LIBRARIES[0]).unwrap();
     let key = b"\nsources=";
     let mut changed = 0;

@@ -1,5 +1,5 @@
-//! Engines of the project as plugins: what is loaded reads the same as what is linked
-//! in, and all stand in one table.
+//! The project's engines as plugins: a loaded engine reads the same as a linked one, and all are in
+//! one table.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
@@ -14,7 +14,7 @@ use std::process::Command;
 use cli_support::Workplace;
 use serde_json::Value;
 
-/// The engine that is linked in under every set of features that CI builds.
+/// The engine that is linked in with every set of features that CI builds.
 const LINKED: &str = if cfg!(feature = "mujoco") {
     "mujoco"
 } else {
@@ -74,7 +74,7 @@ fn loaded_and_linked_engines_give_identical_figures() {
     assert!(linked.iter().all(|(_, _, outcome)| outcome != "fail"));
 }
 
-/// Builds the engine of the ABI's own tests with one fault.
+/// Builds the test engine of the ABI with one fault.
 fn faulty(place: &Workplace, fault: &str) -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("backends/abi");
     let library = place.path("libfaulty.so");
@@ -91,7 +91,7 @@ fn faulty(place: &Workplace, fault: &str) -> PathBuf {
     library
 }
 
-/// Runs a call that must fail with a status, and returns its one line.
+/// Runs a call that must fail with `status`, and returns its one line.
 fn one_line(place: &Workplace, arguments: &[&str], status: i32) -> String {
     let output = place.run(arguments);
     let said = String::from_utf8(output.stderr).unwrap();
@@ -125,7 +125,7 @@ fn a_library_that_is_cut_short_has_a_last_word() {
     let whole = std::fs::read(&library).unwrap();
     std::fs::write(&library, &whole[..9000.min(whole.len() / 2)]).unwrap();
     let file = library.to_str().unwrap();
-    // The system's loader refuses such a file, or dies of it.
+    // The system's loader refuses such a file or crashes.
     let output = place.run(&["list", "--plugin", file]);
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(matches!(output.status.code(), Some(1 | 2)), "{said}");

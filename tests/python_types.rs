@@ -1,5 +1,7 @@
-//! The dataclasses of the Python package are those that the layouts of `result.json` give: `python/asid/results.py` is
-//! generated, and compared here. `ASID_WRITE=1 cargo test --test python_types` writes it anew.
+//! The dataclasses of the Python package agree with the layouts of `result.json`.
+//!
+//! `python/asid/results.py` is generated, and compared here.
+//! `ASID_WRITE=1 cargo test --test python_types` writes it anew.
 
 mod python_support;
 

@@ -1,4 +1,4 @@
-//! Studies of real machines: what is known of them is found in their logs.
+//! Studies of real machines: known properties of them are found in their logs.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,7 +13,7 @@ use asid::diagnosis::settings::Breadth;
 use asid::diagnosis::study::Study;
 use diagnosis_support::engine;
 
-/// Diagnoses some of the episodes of a study by single effects.
+/// Diagnoses some episodes of a study with single effects.
 fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("studies")
@@ -36,8 +36,9 @@ fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
     diagnose(&study, machine, settings, &Silent).unwrap().0
 }
 
-/// Of all single effects friction of a joint leaves the least, and less than half of the root mean
-/// square, on episodes that were not fitted.
+/// Asserts that, of all single effects, friction of a joint leaves the smallest gap.
+///
+/// It must be less than half of the root mean square without effects, on held-out episodes.
 fn friction_comes_first(found: &Diagnosis, joint: &str) {
     let ladder = &found.trace.ladder;
     let best = &ladder[0];
@@ -47,8 +48,8 @@ fn friction_comes_first(found: &Diagnosis, joint: &str) {
     assert!(best.gap < 0.5 * identified, "{identified}: {ladder:?}");
 }
 
-/// The authors of these logs find that friction which grows with the load is what a servo's
-/// model lacks most (Duclusaud et al., Extended friction models, 2025).
+/// The authors of these logs find that friction which grows with the load is what a servo's model
+/// lacks most (Duclusaud et al., Extended friction models, 2025).
 #[test]
 fn a_servo_lacks_friction_first_of_all() {
     let found = singles(
@@ -63,9 +64,10 @@ fn a_servo_lacks_friction_first_of_all() {
     friction_comes_first(&found, "output");
 }
 
-/// The authors of these logs find dry friction of 0.09 to 0.19 N m at both joints (Wiebe et al., Open source dual-purpose
-/// acrobot and pendubot platform, 2023). Long replays part whatever the model; the force that is missing from moment to moment
-/// does not.
+/// The authors of these logs find dry friction of 0.09 to 0.19 N m at both joints (Wiebe et al.,
+/// Open source dual-purpose acrobot and pendubot platform, 2023).
+///
+/// Long replays diverge with any model. The missing force from moment to moment does not.
 #[test]
 fn a_double_pendulum_lacks_dry_friction_at_both_joints() {
     let found = singles(

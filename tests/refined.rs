@@ -1,5 +1,5 @@
-//! A scene with effects is a model like any other: parameters that change from step to
-//! step, effects' parameters as columns, memory in snapshots.
+//! A scene with effects is a model like any other: parameters that change from step to step,
+//! parameters of effects as columns, and memory in snapshots.
 
 #![allow(clippy::unwrap_used)]
 
@@ -13,7 +13,8 @@ const BLOCK: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.001
     <body name="block" pos="0 0 0.05"><freejoint name="free"/><geom name="block" type="box" size="0.1 0.1 0.05" mass="1" friction="0.2 0 0"/></body>
   </worldbody><sensor><framepos name="at" objtype="xbody" objname="block"/></sensor></mujoco>"#;
 
-/// Friction of the block is `after` from the moment on that it is beyond a place.
+/// Sets the block's friction to the second value once the block is beyond the first, a position in
+/// m.
 struct Beyond(f64, f64);
 
 impl StepHook for Beyond {
@@ -31,7 +32,7 @@ fn engines(needed: Capabilities) -> Vec<Box<dyn Backend>> {
     made.filter(|b| b.capabilities().contains(needed)).collect()
 }
 
-/// Where the block comes to rest that starts at 1 m/s.
+/// Position at which the block comes to rest after a start at 1 m/s.
 fn rest(simulator: &mut dyn Simulator, hook: Option<&dyn StepHook>) -> f64 {
     let layout = simulator.layout().clone();
     let recording = layout.recording(&["at"]).unwrap();
@@ -71,7 +72,7 @@ fn a_hook_changes_friction_from_step_to_step_and_for_a_rollout_only() {
             "{}: {plain}, {expected}",
             backend.name()
         );
-        // v² = 1 - 2 mu g place is left at the place, and is used up by the other friction.
+        // At `place` v² = 1 - 2 mu g place is left; the other friction uses it up.
         let hooked = rest(&mut *simulator, Some(&Beyond(place, after)));
         let expected = place + (1.0 - 2.0 * mu * g * place) / (2.0 * after * g);
         assert!(

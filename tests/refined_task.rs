@@ -30,15 +30,17 @@ fn refused(place: &Workplace, arguments: &[&str], expected: &[&str]) {
     assert_eq!(place.names(), before, "{arguments:?} left something");
 }
 
-/// A figure of a folder's result.json.
+/// A number of a folder's result.json.
 fn figure(place: &Workplace, folder: &str, pointer: &str) -> f64 {
     let result: Value =
         serde_json::from_str(&place.read(&format!("{folder}/result.json"))).unwrap();
     result.pointer(pointer).unwrap().as_f64().unwrap()
 }
 
-/// The scene of a task and a refined model of it: gravity turned by 0.1 rad, so that what
-/// lies on the table slides in -y, and dry friction in a joint.
+/// Writes the scene of a task and a refined model of it.
+///
+/// The refined model has dry friction in a joint, and gravity tilted by 0.1 rad, so that what lies
+/// on the table slides in -y.
 fn refined(place: &Workplace, task: &str) {
     done(place, &["export", task, "--out", "scene.xml"]);
     place.write(
@@ -63,7 +65,7 @@ fn the_effects_of_a_refined_model_are_in_the_simulator_and_its_config_repeats_it
     ];
     let solve = |more: &[&str]| done(&place, &tiny(&[&solve[..], more].concat()));
     solve(&["--out", "plain"]);
-    // The scene as a file is the scene.
+    // The exported scene gives the same result as the task's scene.
     solve(&["--out", "same", "--model", "scene.xml"]);
     solve(&["--out", "other", "--model", "refined.toml"]);
     solve(&["--out", "again", "--config", "other/config.toml"]);

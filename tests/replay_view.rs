@@ -1,4 +1,4 @@
-//! The machine in 3-D, in the reports that the program writes: what the data say, and what a browser shows of them.
+//! The machine in 3-D in the reports: the data, and what a browser shows of them.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // A test that is skipped says so.
 
@@ -14,7 +14,7 @@ use cli_support::{Workplace, tiny};
 use serde_json::Value;
 use world::{Truth, write_study};
 
-/// Largest report, bytes.
+/// Size limit of a report, bytes.
 const LARGEST: u64 = 3_000_000;
 
 fn ok(place: &Workplace, arguments: &[&str]) {
@@ -26,8 +26,10 @@ fn ok(place: &Workplace, arguments: &[&str]) {
     );
 }
 
-/// Looks at a folder's report in both themes: it is drawn, it moves with the slider, and nothing goes wrong. `machines`
-/// are the names in the legend, as they begin.
+/// Asserts that a folder's report is drawn in both themes, moves with the slider, and has no
+/// errors.
+///
+/// `machines` are the beginnings of the names in the legend.
 fn looks_right(place: &Workplace, folder: &str, machines: &[&str]) {
     let page = place.path(folder).join("report.html");
     let size = std::fs::metadata(&page).unwrap().len();
@@ -43,9 +45,10 @@ fn looks_right(place: &Workplace, folder: &str, machines: &[&str]) {
                 .unwrap_or_else(|| panic!("{key}: {seen}"))
         };
         assert_eq!(seen["wrong"], Value::Array(Vec::new()), "{folder}: {seen}");
-        // A blank canvas has one colour; a machine's curved surfaces, and the grid's soft lines, have many.
+        // A blank canvas has one colour. The curved surfaces of a machine and the soft lines of the
+        // grid have many.
         assert!(number("colours") > 50.0, "{folder}: {seen}");
-        // A machine a thousandth of whose picture moves can be seen to move.
+        // A motion is visible if it changes more than a thousandth of the picture.
         assert!(
             number("moved") > number("pixels") / 1000.0,
             "{folder}: {seen}"
@@ -65,7 +68,7 @@ fn looks_right(place: &Workplace, folder: &str, machines: &[&str]) {
         );
         let clicked = number("clicked") / number("end");
         assert!((0.4..0.8).contains(&clicked), "{folder}: {clicked}");
-        // The corner shows the page's own ground.
+        // The corner shows the page's background.
         let bright: f64 = seen["corner"]
             .as_array()
             .unwrap()
@@ -92,7 +95,7 @@ fn looks_right(place: &Workplace, folder: &str, machines: &[&str]) {
                 episode["moved"].as_f64().unwrap() > 100.0,
                 "{folder}: {episode}"
             );
-            // What is chosen shows what it says that it has.
+            // The selected episode shows what its name says.
             for part in ["missing force", "real"] {
                 let named = episode["name"].as_str().unwrap().contains(part);
                 let there = episode["legend"].as_str().unwrap().contains(part);
@@ -102,7 +105,7 @@ fn looks_right(place: &Workplace, folder: &str, machines: &[&str]) {
     }
 }
 
-/// The view of a folder's `trace.json`.
+/// The view in a folder's `trace.json`.
 fn view(place: &Workplace, folder: &str) -> Value {
     let trace: Value = serde_json::from_str(&place.read(&format!("{folder}/trace.json"))).unwrap();
     trace["view"].clone()
@@ -136,7 +139,7 @@ fn a_diagnosis_shows_the_log_both_models_and_the_force_that_is_missing() {
         let values = force[key].as_array().unwrap().iter();
         values.map(|x| x.as_f64().unwrap().powi(2)).sum()
     };
-    // What the refined model lacks is a small part of what the nominal one does.
+    // The missing force of the refined model is a small part of that of the nominal one.
     assert!(
         sum("after") < 0.2 * sum("before"),
         "{} {}",
@@ -148,7 +151,7 @@ fn a_diagnosis_shows_the_log_both_models_and_the_force_that_is_missing() {
         "out",
         &["real", "nominal model", "identified model"],
     );
-    // The report is written anew from its files to the byte.
+    // The report is written anew from its files, byte for byte.
     let page = place.read("out/report.html");
     ok(&place, &["report", "out"]);
     assert!(place.read("out/report.html") == page);
@@ -193,7 +196,7 @@ fn an_exploration_shows_what_the_simulator_expects() {
     looks_right_without_plots(&place, "task");
 }
 
-/// As [`looks_right`], of a page without plots over time.
+/// Like [`looks_right`], for a page without plots over time.
 fn looks_right_without_plots(place: &Workplace, folder: &str) {
     let Some(browser) = browser_support::browser() else {
         return;

@@ -1,5 +1,5 @@
-//! The scorer's own replays, on a cart that another program integrated: which sets are the same physics, and how much
-//! of the gap that can be closed is closed.
+//! The scorer's own replays, on a cart that another program integrated: which sets are the same
+//! physics, and what share of the gap that can be closed is closed.
 
 #![allow(clippy::unwrap_used)]
 
@@ -106,7 +106,7 @@ fn a_drag_on_the_only_moving_body_is_friction_of_its_joint() {
     assert!(same(&[drag]).0, "{:?}", same(&[drag]));
     let (dry, distance) = same(&[("coulomb-friction@rail", "force", 0.5)]);
     assert!(!dry && distance > 1.0, "{distance}");
-    // A set that holds the truth can imitate it, and is another one all the same.
+    // A set that contains the truth can imitate it, but is still another set.
     let both = [VISCOUS, ("coulomb-friction@rail", "force", 0.01)];
     assert!(!same(&both).0, "{:?}", same(&both));
     let none = same(&[]);
@@ -120,7 +120,7 @@ fn the_share_closed_is_one_for_the_truth_and_less_for_half_of_it() {
     let closed = |damping: f64, truth: &Label| {
         let said = [("viscous-friction@rail", "damping", damping)];
         let gaps = examine(folder.path(), truth, &answer(&said)).gaps.unwrap();
-        // Noise, and the model's step of 2 ms.
+        // Noise, and the error of the model's step of 2 ms.
         assert!(gaps.best < 2.5 && gaps.identified > 5.0, "{gaps:?}");
         gaps.closed_of_possible.unwrap()
     };
@@ -128,7 +128,7 @@ fn the_share_closed_is_one_for_the_truth_and_less_for_half_of_it() {
     assert!((closed(1.5, &truth) - 1.0).abs() < 0.02);
     let half = closed(0.75, &truth);
     assert!(half < 0.9, "{half}");
-    // A column of the wrong sign is mended before replays, by what the label says of it.
+    // A column with the wrong sign is corrected before replays, by the label.
     let mut wired = truth.clone();
     wired.wiring = vec![WiringTruth {
         fault: "wiring-sign".into(),

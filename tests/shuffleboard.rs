@@ -1,4 +1,4 @@
-//! The shuffleboard's physics on every engine that is built in.
+//! The shuffleboard's physics on every built-in engine.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
@@ -18,8 +18,10 @@ fn on_every_engine(check: impl Fn(&str, &Problem<'_>)) {
     task_support::on_every_engine("shuffleboard", 0, check);
 }
 
-/// Where a puck far from the hand comes to rest and by what angle it has turned, from the velocity
-/// (x, m/s) and the spin (rad/s) that it is thrown with: one row of x and turn an unknown.
+/// Final position and rotation of a puck far from the hand, thrown with a velocity along x, m/s,
+/// and a spin, rad/s.
+///
+/// Returns one row of x, m, and rotation, rad, per row of unknowns.
 fn throw(problem: &Problem<'_>, theta: &[[f64; 2]], velocity: f64, spin: f64) -> Vec<[f64; 2]> {
     const FRAMES: usize = 500;
     let layout = problem.model.layout();
@@ -99,8 +101,8 @@ fn torsional_friction_shortens_the_spin_of_the_puck() {
             turns.windows(2).all(|w| w[1] < 0.8 * w[0]),
             "{engine}: {turns:?}"
         );
-        // The puck rests on its rim, whose friction has the lever of the radius. Where the two bounds are
-        // independent the torques add up; where a contact has one cone, their squares do.
+        // The puck rests on its rim, whose friction has the radius as its lever arm. If the two
+        // bounds are independent, the torques add; if a contact has one cone, their squares add.
         let angle = |torque: f64| spin * spin * RADIUS * RADIUS / (4.0 * G * torque);
         for (turn, t) in turns.iter().zip(torsional) {
             let rim = mu * RADIUS;
@@ -116,7 +118,7 @@ fn torsional_friction_shortens_the_spin_of_the_puck() {
     });
 }
 
-/// A hand that stands still.
+/// A hand at rest.
 struct Still;
 
 impl Policy for Still {
@@ -178,7 +180,7 @@ fn each_condition_has_its_own_zone() {
     assert_eq!(scores, [[true, false], [false, true]]);
 }
 
-/// The difficulty sets what a shot does to the board, under either condition.
+/// The difficulty sets the wear of the board per shot, under each condition.
 #[test]
 fn a_board_wears_as_much_as_its_difficulty_says() {
     let task = task_support::task("shuffleboard");

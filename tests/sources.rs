@@ -1,5 +1,5 @@
-//! What sources do not hold: unsafe code outside of its places, names of engines and effects outside of theirs, and functions
-//! that are too long to be read. And what pages name of them is there.
+//! What sources must not contain: unsafe code, and names of engines and effects, outside of their
+//! places, and overlong functions. Also checks that what pages name exists.
 
 #![allow(clippy::unwrap_used)]
 
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use source_support::{root, sources, untested};
 
-/// Where unsafe code may stand: `docs/architecture.md` says the same.
+/// Where unsafe code may be; `docs/architecture.md` says the same.
 const UNSAFE: [&str; 4] = [
     "backends/",
     "plugin/",
@@ -19,7 +19,8 @@ const UNSAFE: [&str; 4] = [
     "fuzz/memory.rs",
 ];
 
-/// Where an engine may be named: its own crate, what makes engines known to the build, and what is measured against one.
+/// Where an engine may be named: its own crate, what registers engines in the build, and
+/// measurements against an engine.
 const ENGINES: [&str; 8] = [
     "asid-core/src/scene.rs",
     "backends/",
@@ -31,10 +32,10 @@ const ENGINES: [&str; 8] = [
     "algorithms/learned/testing.rs",
 ];
 
-/// Where an effect may be named: its own crate, and what knows the answers.
+/// Where an effect may be named: its own crate, and crates that know the answers.
 const EFFECTS: [&str; 4] = ["bench/", "effects/", "scorer/", "withheld/"];
 
-/// Lines of a function, from its name to its last brace.
+/// Largest number of lines of a function, from its name to its last brace.
 const LONGEST: usize = 100;
 
 /// Sources by their path from the root, without tests and comments.
@@ -57,14 +58,14 @@ fn code() -> Vec<(String, String)> {
     all
 }
 
-/// Places of `code` outside of `allowed` that hold one of `texts`.
+/// Places of `code` outside of `allowed` that contain one of `texts`.
 fn strangers(code: &[(String, String)], allowed: &[&str], texts: &[String]) -> Vec<String> {
     let outside = code
         .iter()
         .filter(|(place, _)| !allowed.iter().any(|a| place.starts_with(a)));
     let lines = outside.flat_map(|(place, text)| text.lines().map(move |l| (place, l)));
     lines
-        // A cargo feature has a name of its own.
+        // A cargo feature may share a name.
         .filter(|(_, line)| !line.contains("feature = "))
         .filter(|(_, line)| texts.iter().any(|t| line.contains(t.as_str())))
         .map(|(place, line)| format!("{place}: {}", line.trim()))
@@ -117,13 +118,13 @@ fn no_crate_decides_by_the_name_of_an_engine_or_an_effect() {
     assert!(found.is_empty(), "engines by name: {found:#?}");
     let effects = names("effects");
     assert!(effects.len() > 30, "{effects:?}");
-    // Attributes of MJCF have some of the names; those with a hyphen are of effects alone.
+    // Some of the names are also attributes of MJCF. Names with a hyphen belong to effects alone.
     let effects: Vec<String> = effects.into_iter().filter(|e| e.contains('-')).collect();
     let found = strangers(&code, &EFFECTS, &effects);
     assert!(found.is_empty(), "effects by name: {found:#?}");
 }
 
-/// Functions of a formatted text: name and lines.
+/// Functions of a formatted text: name and number of lines.
 fn functions(text: &str) -> Vec<(String, usize)> {
     let lines: Vec<&str> = text.lines().collect();
     let mut found = Vec::new();
@@ -180,7 +181,7 @@ fn the_reading_of_functions_sees_what_is_there() {
     assert!(strangers(&code, &["src/"], &jet).is_empty());
 }
 
-/// The folder of the sources of each crate that others use, by its name in code.
+/// Source folder of each crate that others use, by its name in code.
 fn crates() -> BTreeMap<String, PathBuf> {
     let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
     let manifest: toml::Table = manifest.parse().unwrap();
@@ -194,14 +195,14 @@ fn crates() -> BTreeMap<String, PathBuf> {
     own.collect()
 }
 
-/// Paths of items between code marks of a page, such as `asid_core::Error`.
+/// Paths of items in code marks of a page, such as `asid_core::Error`.
 fn paths(text: &str) -> Vec<&str> {
     let code = text.split('`').skip(1).step_by(2);
     code.filter(|c| c.starts_with("asid_") && c.contains("::"))
         .collect()
 }
 
-/// Whether a path leads to a module, or to a name that its last module speaks of.
+/// Whether a path leads to a module, or to a name in its last module.
 fn leads(crates: &BTreeMap<String, PathBuf>, path: &str) -> bool {
     let mut names = path.split("::");
     let Some(source) = names.next().and_then(|name| crates.get(name)) else {
@@ -224,7 +225,7 @@ fn leads(crates: &BTreeMap<String, PathBuf>, path: &str) -> bool {
     true
 }
 
-/// Whether the code of a file has a name.
+/// Whether the code of a file contains a name.
 fn speaks_of(file: &Path, name: &str) -> bool {
     let text = fs::read_to_string(file).unwrap();
     let code = text.lines().filter(|l| !l.trim_start().starts_with("//"));

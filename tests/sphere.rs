@@ -1,7 +1,9 @@
-//! Physics of the tasks with a ball on every engine that is built in: rolling friction stops the
-//! ball where theory says, on each patch, and the softness of the paddle's contact moves the outcome.
+//! Physics of the tasks with a ball, on every built-in engine.
 //!
-//! `cargo test --features mujoco --test sphere -- --nocapture` prints what each engine gives.
+//! Rolling friction stops the ball where theory says, on each patch. The softness of the paddle's
+//! contact changes the outcome.
+//!
+//! `cargo test --features mujoco --test sphere -- --nocapture` prints the results of each engine.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a skipped check is a printed row
 
@@ -18,7 +20,7 @@ use task_support::visits;
 const RADIUS: f64 = 0.03;
 const G: f64 = 9.81;
 
-/// Calls `check` with a problem for each engine that can do what the task and `parameters` ask for.
+/// Calls `check` with a problem for each engine that supports what the task and `parameters` need.
 fn on_every_engine(
     task: &str,
     optional: &str,
@@ -47,7 +49,8 @@ fn on_every_engine(
     }
 }
 
-/// How far a ball rolls that starts at `from` (m) with `speed` along y (m/s), for each row of unknowns.
+/// Rolling distance of a ball that starts at `from` (m) with `speed` along y (m/s), for each row of
+/// unknowns.
 fn roll_out(problem: &Problem<'_>, from: [f64; 2], speed: f64, unknowns: &[Vec<f64>]) -> Vec<f64> {
     let layout = problem.model.layout();
     let n = unknowns.len();
@@ -68,7 +71,7 @@ fn roll_out(problem: &Problem<'_>, from: [f64; 2], speed: f64, unknowns: &[Vec<f
         batch.simulator.rollout(&rollout, &mut out).unwrap();
         out
     };
-    // It lies at the height that the floor's softness leaves, and then rolls.
+    // The ball first settles at the height that the floor's softness gives, and then rolls.
     let settled = run(&mut batch, 20);
     qpos[ball.qpos + 2] = settled[settled.len() - 1];
     let mut qvel = home.1.clone();
@@ -84,7 +87,7 @@ fn roll_out(problem: &Problem<'_>, from: [f64; 2], speed: f64, unknowns: &[Vec<f
         .collect()
 }
 
-/// A solid ball of radius r is slowed by 5/7 mu g / r.
+/// Distance of a solid ball of radius r, which decelerates by 5/7 mu g / r.
 fn theory(speed: f64, friction: f64) -> f64 {
     speed * speed / (2.0 * 5.0 / 7.0 * friction * G / RADIUS)
 }
@@ -100,14 +103,14 @@ fn rolling_friction_stops_the_ball_where_theory_says() {
                 let expected = theory(0.35, friction);
                 let error = way / expected - 1.0;
                 println!("{task}, {engine}, {friction} m: {way:.4} m, theory {expected:.4} m");
-                // A ball sunk in by 0.25 mm rolls on a radius 0.8 % smaller.
+                // A ball that sinks in by 0.25 mm rolls on a radius 0.8 % smaller.
                 assert!(error.abs() < 0.03, "{task}, {engine}, {friction}: {error}");
             }
         });
     }
 }
 
-/// Patches that a ball sinks into have a ridge at each seam, which throws a slow ball back.
+/// Patches into which a ball sinks have a ridge at each seam, which throws a slow ball back.
 #[test]
 fn a_slow_ball_rolls_over_the_seams() {
     on_every_engine(
@@ -181,8 +184,8 @@ fn a_ball_at_rest_sinks_into_a_soft_floor_as_its_time_constant_says() {
             let rollout = Rollout::new(&[0], frames, 10, Control::Shared(&ctrl), &recording);
             batch.simulator.rollout(&rollout, &mut out).unwrap();
             let sunk = RADIUS - out[out.len() - 1];
-            // A spring and damper of time constant 0.02 s, damped critically, of which the impedance 0.5 acts:
-            // the rest of the weight's acceleration is let through.
+            // A critically damped spring and damper with a time constant of 0.02 s, of which the
+            // impedance 0.5 acts. The rest of the weight's acceleration passes through.
             let theory = (1.0 - 0.5) * G * 0.02 * 0.02;
             println!(
                 "{engine}: sunk in by {:.3} mm, theory {:.3} mm",
@@ -241,13 +244,14 @@ fn a_softer_ball_leaves_the_paddle_faster() {
             println!(
                 "{engine}: time constants {constants:?} s, the ball rests at y = {ends:.4?} m"
             );
-            // The spring of the contact gives back what it took when the paddle stops.
+            // When the paddle stops, the contact's spring returns its energy.
             assert!(ends[0] > ends[1] + 0.005, "{engine}: {ends:?}");
         },
     );
 }
 
-/// A paddle that stops lets the ball roll on as fast as it was itself, but for what the contact's spring gives back.
+/// When the paddle stops, the ball rolls on at the paddle's speed, plus what the contact's spring
+/// returns.
 #[test]
 fn a_struck_ball_rolls_on_as_fast_as_the_paddle() {
     on_every_engine(
@@ -279,9 +283,9 @@ fn a_struck_ball_rolls_on_as_fast_as_the_paddle() {
     );
 }
 
-/// Moves the hand on a straight line towards where a ball was first seen.
+/// Moves the hand on a straight line towards the first reading of a ball.
 struct Towards {
-    /// First entry of the ball's position in a reading's row, and of the hand's.
+    /// Index of the ball's position in a reading's row, and of the hand's.
     ball: usize,
     hand: usize,
     aim: Option<[f64; 2]>,
@@ -307,7 +311,7 @@ impl Policy for Towards {
     }
 }
 
-/// Each ball is tracked, and touches are told apart: what an explorer went for can be seen.
+/// Each ball is tracked and its contacts are separate, which shows the explorer's target.
 #[test]
 fn a_push_at_one_ball_touches_and_moves_it_alone() {
     on_every_engine(
@@ -342,7 +346,7 @@ fn a_push_at_one_ball_touches_and_moves_it_alone() {
                         "{engine}, at {pushed}: {label} touched {touched:.2}, moved {way:.3} m"
                     );
                     assert_eq!(touched > 0.0, i == pushed, "{engine}, {label}: {touched}");
-                    // Unmoved but for the noise of two readings, 2 mm each.
+                    // Unmoved, up to the noise of two readings of 2 mm each.
                     assert_eq!(way > 0.015, i == pushed, "{engine}, {label}: {way}");
                 }
                 assert_eq!(real.contact_fraction > 0.0, pushed == 0);
@@ -351,7 +355,7 @@ fn a_push_at_one_ball_touches_and_moves_it_alone() {
     );
 }
 
-/// A ball that is struck through the patches in turn covers them; one that stays does not.
+/// A ball that is struck through all patches covers them; one at rest does not.
 #[test]
 fn visits_of_the_patches_can_be_counted() {
     let task = (find::<TaskEntry>("sphere-patches").unwrap().make)().unwrap();
@@ -367,7 +371,8 @@ fn visits_of_the_patches_can_be_counted() {
     assert_eq!(visits::coverage(&still), 0.0);
 }
 
-/// Expected deviations before and after a push at a ball that lies still, of all unknowns in their middle.
+/// Expected standard deviations before and after a push at a ball at rest, with all unknowns at
+/// their centres.
 fn told_by_a_push(problem: &Problem<'_>) -> [Vec<f64>; 2] {
     let start = [0.5, 0.0];
     let theta: Vec<f64> = problem.parameters.iter().map(Parameter::center).collect();
@@ -393,9 +398,11 @@ fn told_by_a_push(problem: &Problem<'_>) -> [Vec<f64>; 2] {
     [told.expected_std[0].clone(), last]
 }
 
-/// A ball leaves the paddle as fast as the contact is stiff, so a push tells the stiffness. The floor's
-/// sliding friction tells little: above 0.5 a pushed ball rolls at once. Neither keeps the rolling friction
-/// from being found.
+/// The ball's speed after the paddle depends on the contact's stiffness, so a push is informative
+/// about the stiffness.
+///
+/// It is hardly informative about the floor's sliding friction: above 0.5 a pushed ball rolls at
+/// once. Neither unknown prevents the rolling friction from being found.
 #[test]
 fn a_push_tells_the_stiffness_and_hardly_the_sliding_friction() {
     for (unknown, needs, share) in [

@@ -1,4 +1,4 @@
-//! The same checks over every registered task on every registered engine.
+//! The same checks of every registered task on every registered engine.
 //!
 //! `cargo test --features mujoco --test tasks -- --nocapture` prints the table.
 
@@ -28,10 +28,10 @@ use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
 use task_support::visits;
 
-/// Actions at which the metric is looked at.
+/// Number of actions at which the metric is evaluated.
 const TRIES: usize = 12;
 
-/// What a row of the table says of a check.
+/// A check of a problem; returns its cell of the table.
 type Check = fn(&Problem<'_>) -> String;
 
 const CHECKS: [(&str, Check); 5] = [
@@ -46,7 +46,7 @@ const CHECKS: [(&str, Check); 5] = [
 fn every_task_on_every_engine() {
     for entry in all::<TaskEntry>() {
         let task = (entry.make)().unwrap();
-        // Optional unknowns too.
+        // Includes the optional unknowns.
         let mut parameters = task.parameters();
         parameters.extend(task.optional_parameters());
         for parameter in &parameters {
@@ -58,7 +58,7 @@ fn every_task_on_every_engine() {
     }
 }
 
-/// A difficulty changes what it says, in a task that is otherwise the same.
+/// A difficulty changes its own setting in an otherwise equal task.
 #[test]
 fn every_difficulty_can_be_set_over_its_range() {
     for entry in all::<TaskEntry>() {
@@ -72,7 +72,7 @@ fn every_difficulty_can_be_set_over_its_range() {
                 assert_eq!(other.difficulty(), task.difficulty());
                 Plant::of(other.scene()).unwrap();
                 for condition in other.conditions() {
-                    // A condition's task is as hard as the one that it is of.
+                    // A condition's task is as hard as its base task.
                     let under = other.under(&condition.name).unwrap();
                     if let Some(under) = under {
                         let noise = |t: &dyn Task| t.exploration().signals[0].noise;
@@ -97,7 +97,7 @@ fn every_difficulty_can_be_set_over_its_range() {
     }
 }
 
-/// What figures ask of a task is there, and lies where the picture is.
+/// Objects and regions that figures need exist, and are within the picture.
 #[test]
 fn objects_are_tracked_and_regions_lie_apart() {
     for entry in all::<TaskEntry>() {
@@ -125,7 +125,7 @@ fn objects_are_tracked_and_regions_lie_apart() {
     }
 }
 
-/// Readings at a tenth of the frames are those of every frame, the others missing.
+/// Readings at a tenth of the frames equal those of every frame, and the others are missing.
 #[test]
 fn a_slow_tracker_reads_at_each_control_step_and_not_between() {
     let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
@@ -142,7 +142,7 @@ fn a_slow_tracker_reads_at_each_control_step_and_not_between() {
     };
     let (every, some) = (play(&*task), play(&*slow));
     let frames = ReadingFrames::of(&*slow, 0.02);
-    // Position and orientation of the rod come first.
+    // The rod's position and orientation come first.
     let tracked = 7;
     for k in 0..every.rows() {
         let (a, b) = (every.reading(k), some.reading(k));
@@ -173,7 +173,7 @@ fn on(task: &dyn Task, parameters: &[Parameter], engine: &BackendEntry) {
     let model = backend.load(task.scene()).unwrap();
     let signals = task.exploration().signals.clone();
     let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
-    // An unknown that this engine cannot set is left out; the task's own it must be able to set.
+    // Unknowns that this engine cannot set are left out, but it must be able to set the task's own.
     let settable: Vec<Parameter> = parameters
         .iter()
         .filter(|p| {
@@ -206,7 +206,7 @@ fn on(task: &dyn Task, parameters: &[Parameter], engine: &BackendEntry) {
     println!("{row} {:.1} s", clock.elapsed().as_secs_f64());
 }
 
-/// What a task sets of an algorithm is a setting of it.
+/// Asserts that each setting of a task is a setting of its algorithm.
 fn settings_are_taken(task: &dyn Task) {
     let merged = |section: &str, name: &str, mut settings: Settings| {
         for (key, value) in task.settings(section, name) {
@@ -275,7 +275,7 @@ fn seeded_episodes_are_identical(problem: &Problem<'_>) -> String {
     };
     assert_eq!(bits(&a), bits(&b));
     assert_ne!(a.true_start, c.true_start, "the seed draws no start");
-    // The first reading shows the start pose, but for the noise.
+    // The first reading shows the initial pose, up to the noise.
     let start = a.true_start.unwrap();
     let tracked: usize = problem
         .signals
@@ -322,7 +322,7 @@ fn observations_are_within_bounds(problem: &Problem<'_>) -> String {
                         let norm = x.iter().map(|q| q * q).sum::<f64>().sqrt();
                         assert!((norm - 1.0).abs() < 1e-5, "{}", where_());
                     }
-                    // No joint of a machine here turns or slides further.
+                    // No joint of a machine here exceeds this.
                     "jointpos" => {
                         assert!(x[0].abs() < std::f64::consts::TAU + slack, "{}", where_())
                     }
@@ -340,7 +340,7 @@ fn every_parameter_acts(problem: &Problem<'_>) -> String {
     names.join(", ")
 }
 
-/// Random commands of exploration, `steps` control steps.
+/// Random exploration commands over `steps` control steps.
 fn commands(problem: &Problem<'_>, steps: usize) -> Vec<f64> {
     let protocol = problem.task.exploration();
     let mut rng = Streams::new(5).stream("commands");
@@ -386,7 +386,7 @@ fn snapshots_continue_to_the_bit(problem: &Problem<'_>) -> String {
     play(0, first, simulator);
     let snapshot = simulator.save(&[0]).unwrap();
     let once = play(0, second, simulator);
-    // Into the same simulation, and into one that stands elsewhere.
+    // Into the same simulation, and into one in another state.
     simulator.load(&snapshot, &[0], &[0]).unwrap();
     assert_eq!(once, play(0, second, simulator));
     simulator.load(&snapshot, &[0], &[1]).unwrap();
@@ -445,7 +445,7 @@ fn the_metric_tells_good_from_bad(problem: &Problem<'_>) -> String {
     let order = |a: &&Outcome, b: &&Outcome| a.cost.total_cmp(&b.cost);
     let best = outcomes.iter().min_by(order).unwrap();
     let worst = outcomes.iter().max_by(order).unwrap();
-    // A bad action fails and costs clearly more; wherever one succeeds, so does the cheapest.
+    // A bad action fails and costs clearly more. If any action succeeds, so does the cheapest.
     assert!(
         !worst.success && worst.cost > 1.5 * best.cost,
         "{outcomes:?}"
@@ -456,7 +456,7 @@ fn the_metric_tells_good_from_bad(problem: &Problem<'_>) -> String {
         let beyond = outcomes.iter().any(|o| o.success && o.value > limit);
         assert!(!beyond, "{outcomes:?}");
     }
-    // A reading that is missing is no success.
+    // A missing reading is no success.
     let lost = problem.task.outcome(&vec![f64::NAN; row]);
     assert!(!lost.success && lost.cost.is_finite() && lost.value.is_finite());
     assert!(lost.cost >= best.cost);

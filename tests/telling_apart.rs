@@ -1,5 +1,5 @@
-//! Exploration that tells rival explanations apart, and the loop from a task's runs through their
-//! diagnosis back to the task.
+//! Exploration that discriminates between rival explanations, and the loop from a task's runs
+//! through their diagnosis back to the task.
 
 #![allow(clippy::unwrap_used)]
 
@@ -48,19 +48,19 @@ fn rivals_differ_only_where_the_puck_slides_and_the_plan_makes_it_slide() {
             .collect();
         let plans = [still, ahead];
 
-        // The same explanation twice cannot be told apart, whatever is done.
+        // The same explanation twice cannot be distinguished by any plan.
         let same = [0.02, 0.02].map(|f| puck(problem, model, f));
         let mut explorer = Discriminating::new(same.to_vec()).unwrap();
         let none = explorer.divergence(problem, &start, &plans).unwrap();
         assert!(none.iter().all(|d| *d < 1e-20), "{none:?}");
 
-        // Two frictions differ once the puck slides: the slower by a share of its path that
-        // tracking to 2 mm sees many times over.
+        // Two frictions differ once the puck slides. With more friction it slides less far, by a
+        // share of its path that is many times the tracking noise of 2 mm.
         explorer.rivals = [0.012, 0.03].map(|f| puck(problem, model, f)).to_vec();
         let apart = explorer.divergence(problem, &start, &plans).unwrap();
         assert!(apart[0] < 0.1 && apart[1] > 100.0, "{apart:?}");
 
-        // Half of the squared distance in units of the noise, by the weights of both.
+        // Half of the squared distance in units of the noise, weighted by both weights.
         explorer.rivals[0].weight = 0.9;
         explorer.rivals[1].weight = 0.1;
         let weighted = explorer.divergence(problem, &start, &plans).unwrap();
@@ -95,7 +95,7 @@ fn one_explanation_cannot_be_told_apart() {
 #[test]
 fn a_task_is_run_diagnosed_and_run_again() {
     let place = Workplace::new();
-    // A catalogue of two makes it quick.
+    // A catalogue of two effects keeps the test short.
     let kept = ["actuator-bias", "sensor-bias"];
     let without: Vec<&str> = all::<EffectEntry>()
         .iter()
@@ -179,14 +179,14 @@ fn a_task_is_run_diagnosed_and_run_again() {
     let page = place.read("a/report.html");
     assert!(page.contains("The task, before and after"));
 
-    // The folder's settings repeat it.
+    // The folder's settings repeat the run.
     let again = place.run(&["diagnose", "--config", "a/config.toml", "--out", "b"]);
     assert!(
         again.status.success(),
         "{}",
         String::from_utf8_lossy(&again.stderr)
     );
-    // All but the time that it took.
+    // Everything but the elapsed time is the same.
     let [first, second] = ["a", "b"].map(|folder| {
         let text = place.read(&format!("{folder}/result.json"));
         let mut result: serde_json::Value = serde_json::from_str(&text).unwrap();

@@ -1,4 +1,4 @@
-//! Kinds of real worlds: what is drawn, what a scene gets of it, and the command line around it.
+//! Kinds of real worlds: what is drawn, how a scene gets it, and the command line.
 
 #![allow(clippy::unwrap_used)]
 
@@ -57,7 +57,7 @@ fn draws_repeat_and_lie_in_their_ranges_and_a_range_moves_no_other() {
     }
 }
 
-/// Actions that have nothing to do with what is seen.
+/// Actions that do not depend on the readings.
 struct Blind(asid::core::rng::Rng);
 
 impl Policy for Blind {
@@ -71,7 +71,7 @@ impl Policy for Blind {
     }
 }
 
-/// An episode of a world with these errors, and what had to be left out.
+/// An episode of a world with these errors, and the errors that had to be left out.
 fn episode(
     backend: &dyn asid::core::Backend,
     problem: &Problem<'_>,
@@ -108,8 +108,8 @@ fn episode(
     (bits, world.left_out)
 }
 
-/// With every range at its null value the perturbed world is the simulator to the bit; each part alone
-/// changes the episode, or is said to be left out.
+/// With every range at its null value, the perturbed world is bitwise the simulator. Each part
+/// alone changes the episode or is reported as left out.
 #[test]
 fn each_part_acts_or_is_said_to_be_left_out() {
     let off = PerturbationRanges::off();
@@ -249,7 +249,7 @@ fn a_run_says_which_world_it_was_in_and_its_config_repeats_it() {
     assert_eq!(place.read("a/config.toml"), place.read("b/config.toml"));
     assert!(place.read("a/report.html").contains("tracker late by"));
 
-    // The same truth and start pose in every world and for every method of a seed.
+    // The truth and the initial pose of a seed are the same in every world and for every method.
     done(&[
         rod,
         "--seed",
@@ -274,7 +274,8 @@ fn a_run_says_which_world_it_was_in_and_its_config_repeats_it() {
         let at = head.split(',').position(|c| c == "rod_pos.0").unwrap();
         row.split(',').nth(at).unwrap().to_owned()
     };
-    // The other rod's first reading is the same to the bit: start and noise are the world's.
+    // The other rod's first reading is bitwise the same: initial pose and noise belong to the
+    // world.
     assert_eq!(first("c"), first("d"));
     assert_ne!(
         first("a"),
@@ -362,8 +363,11 @@ fn worlds_that_cannot_be_are_refused() {
     }
 }
 
-/// What it costs to begin: an arm's controller with the document parsed anew and parsed before, and a small batch
-/// with threads. Printed, as times depend on the machine: `cargo test --test worlds beginning -- --nocapture`.
+/// Cost of starting: an arm's controller with and without parsing the document, and a small batch
+/// with threads.
+///
+/// The times are printed, as they depend on the machine:
+/// `cargo test --test worlds beginning -- --nocapture`.
 #[test]
 fn beginning_costs_no_parsing() {
     const TIMES: u32 = 50;
@@ -373,7 +377,7 @@ fn beginning_costs_no_parsing() {
         let settings = asid::mjcf::cartesian::CartesianSettings::default();
         asid::mjcf::cartesian::CartesianController::new(scene, "ee", &home, settings).unwrap()
     };
-    // The least of many: what else runs on the machine makes single times longer, and never shorter.
+    // The minimum of many: other load on the machine makes single times longer, never shorter.
     let time = |work: &mut dyn FnMut()| {
         let once = |_| {
             let clock = std::time::Instant::now();
@@ -384,7 +388,7 @@ fn beginning_costs_no_parsing() {
     };
     let kept = task.scene();
     let parsed = time(&mut || {
-        // Another folder forgets what was parsed.
+        // Another folder discards the parsed document.
         attempt(&kept.clone().in_directory(None));
     });
     let remembered = time(&mut || {
@@ -396,7 +400,7 @@ fn beginning_costs_no_parsing() {
         1e3 * remembered,
         parsed / remembered
     );
-    // It is two parses against none: far more than ten times as fast on any machine.
+    // Two parses compared with none: far more than ten times as fast on any machine.
     assert!(
         remembered * 10.0 < parsed,
         "{remembered} s against {parsed} s"

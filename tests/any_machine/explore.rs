@@ -1,4 +1,4 @@
-//! `asid explore`: motions within limits, and what they are expected to tell.
+//! `asid explore`: motions within limits, and the information that is expected of them.
 
 use serde_json::Value;
 
@@ -6,7 +6,7 @@ use super::cli_support::Workplace;
 use super::world::{NOMINAL, Truth, write_study};
 use super::{json, ok};
 
-/// Options that make a search short.
+/// Options for a short search.
 const SHORT: [&str; 6] = [
     "--set",
     "design.iterations=10",
@@ -66,7 +66,8 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
         costs[1]
     };
     let best = typical("fisher-cem");
-    // A cart is linear: a periodic motion that fills its limits is near the best there is, and a short search comes near it.
+    // A cart is linear: a periodic motion that uses its limits fully is nearly optimal, and a short
+    // search comes close to it.
     for (explorer, share) in [("random", 1.0), ("multisine", 1.5), ("fourier", 1.0)] {
         let other = typical(explorer);
         assert!(best < share * other, "{explorer}: {best} and {other}");
@@ -81,7 +82,7 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
     assert!(text.starts_with("time,ctrl.belt\n"));
     assert!(rows.iter().all(|r| r[1].abs() <= 8.0));
     assert_eq!(rows.last().unwrap()[1], 0.0);
-    // An independent cart, integrated by hand, keeps them too.
+    // An independent cart, integrated by hand, stays within the limits too.
     let (mut x, mut v) = (0.0_f64, 0.0_f64);
     let (mut far, mut fast) = (0.0_f64, 0.0_f64);
     for pair in rows.windows(2) {
@@ -95,7 +96,7 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
     }
     assert!(far <= 0.4 * 1.01 && fast <= 1.5 * 1.01, "{far} {fast}");
     assert!(far > 0.1, "it hardly moves: {far}");
-    // The same seed gives the same bytes, at any number of threads.
+    // The same seed gives the same bytes with any number of threads.
     let arguments = [
         &[
             "explore",
@@ -115,7 +116,8 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
     assert!(place.path("fisher-cem-0/report.html").is_file());
 }
 
-/// Twenty simulated carts play the motion and are identified: the spread of the estimates is what was expected.
+/// Ten simulated carts play the motion and are identified. The spread of the estimates agrees
+/// with the expected standard deviation.
 #[test]
 fn the_expected_deviation_is_the_actual_one() {
     use std::fmt::Write as _;
@@ -188,14 +190,14 @@ fn the_expected_deviation_is_the_actual_one() {
         off.push(json(&said)["parameters"][0]["estimate"].as_f64().unwrap() - 1.0);
     }
     let actual = (off.iter().map(|x| x * x).sum::<f64>() / off.len() as f64).sqrt();
-    // Ten draws give a deviation to 22 %: three of these.
+    // Ten draws give a standard deviation to 22 %; the bounds are three times that.
     assert!(
         (0.34..1.7).contains(&(actual / expected)),
         "{actual} {expected}"
     );
 }
 
-/// Designs a motion for a variant of the cart; what it says.
+/// Designs a motion for a variant of the cart; returns its result and the standard output.
 fn design_for(model: &str, options: &[&str]) -> (Value, String) {
     let place = Workplace::new();
     place.write("cart.xml", model);
@@ -205,8 +207,9 @@ fn design_for(model: &str, options: &[&str]) -> (Value, String) {
     (json(&place.read("motion/result.json")), said)
 }
 
-/// Symptom: "no actuator has a range to move in: … such as --limit-position JOINT:LOW:HIGH", with this very limit given. Cause: only a
-/// command's range, a servo's joint or a limit of force bounded a drive.
+/// Symptom: "no actuator has a range to move in: … such as --limit-position JOINT:LOW:HIGH", with
+/// this very limit given. Cause: only a command's range, a servo's joint range or a force limit
+/// bounds a drive.
 #[test]
 fn a_limit_of_the_joint_alone_is_enough_for_a_motion() {
     let free = NOMINAL.replace(r#"ctrlrange="-20 20""#, "");
@@ -221,7 +224,8 @@ fn a_limit_of_the_joint_alone_is_enough_for_a_motion() {
     assert!(known(["--limit-speed", "rail:1"]) < 0.1);
 }
 
-/// Symptom: a joint that began at the end of its range was refused. Cause: only an end of the limit counted, 2 % within the range.
+/// Symptom: a joint that begins at the end of its range is refused. Cause: only an end of the limit
+/// counts, 2 % within the range.
 #[test]
 fn a_joint_may_stay_at_the_end_of_its_range_where_the_limit_ends_before_it() {
     let rail = r#"<joint name="rail""#;

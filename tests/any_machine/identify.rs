@@ -9,7 +9,8 @@ fn a_study_is_identified_and_its_refined_model_exported() {
     let place = Workplace::new();
     write_study(&place.path("cart"), Truth::Viscous(1.5));
     let study = place.read("cart/study.toml");
-    // Damping is unknown too; a mass of the same cart twice over cannot be told from the first.
+    // Damping is unknown too. The mass of the cart is present twice (mass and armature), so that
+    // the two cannot be told apart.
     let more = "[[parameter]]\nname = \"damping\"\ntarget = \"joint/rail/damping\"\nrange = [0.0, 8.0]\n\
                 [[parameter]]\nname = \"rotor\"\ntarget = \"joint/rail/armature\"\nrange = [0.0, 0.5]\n";
     place.write("cart/study.toml", &format!("{study}{more}"));
@@ -26,7 +27,7 @@ fn a_study_is_identified_and_its_refined_model_exported() {
     );
     assert!(low - 0.02 < 3.5 && 3.5 < high + 0.02, "{damping}");
     assert!(high - low < 0.2);
-    // Mass and rotor add up: their difference is named as unseen.
+    // Mass and armature add up, so their difference is reported as unseen.
     let unseen = result["unseen"].as_array().unwrap();
     assert_eq!(unseen.len(), 1, "{unseen:?}");
     let sum = of("mass")["estimate"].as_f64().unwrap() + of("rotor")["estimate"].as_f64().unwrap();
@@ -43,7 +44,7 @@ fn a_study_is_identified_and_its_refined_model_exported() {
     ] {
         assert!(place.path("fit").join(file).is_file(), "{file}");
     }
-    // The refined model goes home, and replays the logs as well.
+    // The refined model replaces the model, and replays the logs equally well.
     let refined = place.read("fit/refined.toml");
     place.write("cart/refined.toml", &refined);
     let study = place
@@ -62,7 +63,7 @@ fn a_study_is_identified_and_its_refined_model_exported() {
         );
         assert!((a - b).abs() < 1e-6 && a < 1.2, "{row}");
     }
-    // It repeats to the byte.
+    // A second run gives the same bytes.
     ok(
         &place,
         &[
@@ -100,7 +101,7 @@ fn a_study_is_fitted_in_another_model_that_takes_the_place_of_its_own() {
     assert!(place.read("other/config.toml").contains("damped.xml"));
 }
 
-/// A body that is one geom has one mass, under two names.
+/// A body with a single geom has one mass under two names.
 #[test]
 fn the_mass_of_a_body_of_one_geom_is_that_of_the_geom() {
     let place = Workplace::new();
@@ -113,15 +114,16 @@ fn the_mass_of_a_body_of_one_geom_is_that_of_the_geom() {
     assert_eq!(read.parameters[0].targets, mass().targets);
 }
 
-/// Symptom: "gap on logs held out: 0.00 as given, 0.00 identified" where these logs have six rows. Cause: their starts are open, and
-/// fitted to all rows; of what is left, nothing, the mean was 0.
+/// Symptom: "gap on logs held out: 0.00 as given, 0.00 identified" where these logs have six rows.
+/// Cause: their unknown initial states are fitted to all rows; no row is left, and the mean of
+/// nothing is 0.
 #[test]
 fn logs_that_are_all_warm_up_are_called_too_short_for_a_gap() {
     let place = Workplace::new();
     write_study(&place.path("cart"), Truth::None);
     for name in ["test_4.csv", "test_5.csv"] {
         let log = place.read(&format!("cart/{name}"));
-        // Six rows, without the columns that give the start.
+        // Six rows, without the columns of the initial state.
         let rows = log.lines().take(7);
         let rows: Vec<String> = rows
             .map(|l| l.split(',').take(4).collect::<Vec<_>>().join(",") + "\n")

@@ -1,4 +1,4 @@
-//! Motions that are played in the simulator: what they tell, and which limits they keep.
+//! Motions that are simulated: their information, and their limits.
 
 use asid::core::registry::{BackendEntry, find};
 use asid::core::signal::Signal;
@@ -11,8 +11,9 @@ use asid::sysid::tells::{differences, of_plays};
 use super::mass;
 use super::world::NOMINAL;
 
-/// Without friction a cart's place is `F(t) / m` for some `F` of the commands alone, so that its derivative in the mass is
-/// `-x / m`, and what readings of the place tell is the sum of `(x / (m σ))²`.
+/// Without friction a cart's position is `F(t) / m`, with `F` a function of the commands alone. Its
+/// derivative with respect to the mass is therefore `-x / m`, and the information of the position
+/// readings is the sum of `(x / (m σ))²`.
 #[test]
 fn the_information_about_a_mass_is_the_closed_form() {
     let xml = NOMINAL.replace(r#" damping="2""#, "");
@@ -48,14 +49,15 @@ fn the_information_about_a_mass_is_the_closed_form() {
         .iter()
         .map(|x| (x / (1.3 * sigma)).powi(2))
         .sum();
-    // In prior deviations: a uniform prior's is its width by the root of twelve.
+    // In standard deviations of the prior: that of a uniform prior is its width over the root of
+    // twelve.
     let prior = 2.6 / 12.0_f64.sqrt();
     let found = told.matrix[(0, 0)] / (prior * prior);
-    // Central differences of 1/m over 0.02 prior deviations are off by their third derivative.
+    // Central differences of 1/m over 0.02 standard deviations are off by their third derivative.
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
 }
 
-/// A servo of gain `kp` that is asked to go 0.1 m presses with 0.1 kp at first.
+/// A servo of gain `kp` with a command of 0.1 m begins with a force of 0.1 kp.
 #[test]
 fn the_force_of_a_servo_is_looked_at_with_the_gain_of_each_point() {
     let xml = NOMINAL.replace(

@@ -1,4 +1,4 @@
-//! What is wrong is told in one line.
+//! Errors are reported in one line.
 
 use super::cli_support::Workplace;
 use super::world::{NOMINAL, Truth, write_study};
@@ -95,8 +95,8 @@ fn what_is_wrong_is_told_in_one_line() {
     assert_eq!(place.names(), ["cart", "model.xml"]);
 }
 
-/// Symptom: a panic in `f64::clamp` where the range of one limit of a force passes the other limit, and memory without end where
-/// `--seconds` is a million.
+/// Symptom: a panic in `f64::clamp` if the range of one force limit passes the other limit, and
+/// unbounded memory if `--seconds` is a million.
 #[test]
 fn motions_that_cannot_be_played_are_refused_in_a_line() {
     let place = Workplace::new();
@@ -122,7 +122,7 @@ fn motions_that_cannot_be_played_are_refused_in_a_line() {
         &["actuator/belt/forcerange/0", "-6 to 8", "upper limit"],
     );
     refused(&["--unknown", &upper], &["lower limit", "which is -5"]);
-    // Either end is unknown, and their ranges overlap.
+    // Both ends are unknown, and their ranges overlap.
     let [low, high] = ["0:-6:2", "1:1:6"].map(|r| format!("actuator/belt/forcerange/{r}"));
     refused(
         &["--unknown", &low, "--nuisance", &high],

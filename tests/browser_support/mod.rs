@@ -1,8 +1,8 @@
-//! Opens pages in a real browser, without a window, and looks at their pixels.
+//! Opens pages in a real browser without a window, and checks their pixels.
 //!
-//! The browser is Chromium (or Chrome): the one that `ASID_BROWSER` names, or the first that is found. Where there is
-//! none, a test says that it is skipped, and how to have it run. No graphics card is needed: WebGL is drawn by
-//! SwiftShader, which comes with the browser.
+//! The browser is Chromium (or Chrome): the one in `ASID_BROWSER`, or the first one found. Without
+//! a browser a test prints that it is skipped, and how to run it. No graphics card is needed:
+//! SwiftShader, which is part of the browser, draws WebGL.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// Programs that are looked for.
+/// Names of programs to look for.
 const BROWSERS: [&str; 5] = [
     "chromium",
     "chromium-browser",
@@ -19,15 +19,15 @@ const BROWSERS: [&str; 5] = [
     "chrome",
 ];
 
-/// Longest that a page may take, s: drawing without a card on a busy machine takes about ten.
+/// Longest time for a page, s. Drawing without a graphics card takes about ten on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(180);
 
-/// What collects errors, before any script of the page runs.
+/// Script that collects errors, run before any script of the page.
 const ERRORS: &str = include_str!("errors.js");
-/// What moves the slider and looks at pixels, after all scripts of the page have run.
+/// Script that moves the slider and checks pixels, run after all scripts of the page.
 const PROBE: &str = include_str!("probe.js");
 
-/// A browser; `None`, with a line that says so, where there is none.
+/// Returns a browser, or prints a line and returns `None` where there is none.
 pub fn browser() -> Option<PathBuf> {
     let given = std::env::var_os("ASID_BROWSER").map(PathBuf::from);
     let folders = std::env::var_os("PATH").unwrap_or_default();
@@ -44,7 +44,8 @@ pub fn browser() -> Option<PathBuf> {
     found
 }
 
-/// Opens a page from its file, light or dark, plays with its view, and gives what was seen: see `probe.js`.
+/// Opens a page from its file, light or dark, operates its view, and returns what `probe.js`
+/// measured.
 pub fn seen(browser: &Path, page: &Path, dark: bool) -> Value {
     let html = std::fs::read_to_string(page).unwrap();
     let html = html
@@ -69,7 +70,7 @@ pub fn seen(browser: &Path, page: &Path, dark: bool) -> Value {
     if dark {
         command.arg("--blink-settings=preferredColorScheme=0");
     }
-    // The page goes to a file: nobody empties a pipe while this waits.
+    // The page goes to a file, because nothing empties a pipe during the wait.
     let dom = folder.path().join("dom.html");
     let errors = folder.path().join("errors.txt");
     let mut child = command

@@ -1,7 +1,9 @@
-//! A task whose physics is known in closed form: a cart of unknown mass `m` on a rail without friction is
-//! pushed with a force, so that what it moves is inversely proportional to `m`. Downstream it is to be at a
-//! place after a while, under one constant force: `F = 2 m d / t^2`, so that the place is missed by the
-//! share of the way that the mass is off.
+//! A task with physics in closed form: a force pushes a cart of unknown mass `m` on a rail without
+//! friction.
+//!
+//! The cart's displacement is inversely proportional to `m`. Downstream the cart must reach a goal
+//! at distance `d` after the time `t`, under one constant force `F = 2 m d / t^2`. The relative
+//! miss is therefore the relative error of the mass.
 
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::signal::Signal;
@@ -10,16 +12,16 @@ use asid::core::task::{
 };
 use asid::core::{Capabilities, Layout, Result, Scene, Task};
 
-/// Deviation of a reading of the position, m.
+/// Standard deviation of a position reading, m.
 pub const NOISE: f64 = 1e-3;
-/// Control steps, of one frame each.
+/// Number of control steps, of one frame each.
 pub const HORIZON: usize = 10;
 /// Length of a frame, s.
 pub const FRAME: f64 = 0.02;
-/// Where the cart is to be after [`FRAMES`], m.
+/// Position that the cart must reach after [`FRAMES`], m.
 pub const GOAL: f64 = 0.4;
-/// How long it is pushed downstream: 0.8 s, in which the heaviest cart gets from the furthest start to the
-/// goal under 3.1 N.
+/// Frames of the push downstream: 0.8 s, in which the heaviest cart reaches the goal from the
+/// farthest start with 3.1 N.
 pub const FRAMES: usize = 40;
 /// Largest distance from the goal that counts as success, m.
 pub const NEAR: f64 = 0.02;
@@ -82,7 +84,7 @@ impl Cart {
         }
     }
 
-    /// The mass, uniform or log-uniform on 0.5 to 2 kg.
+    /// The mass, with a uniform or log-uniform prior on 0.5 to 2 kg.
     pub fn mass(scale: Scale) -> Parameter {
         Parameter {
             name: "mass".into(),
@@ -121,8 +123,8 @@ impl Task for Cart {
         Ok(Box::new(Force))
     }
 
-    /// The action is the force that takes the cart to the goal from the middle; from elsewhere it is that
-    /// much more or less.
+    /// The action is the force that moves the cart from the middle to the goal. From elsewhere the
+    /// force is scaled with the distance.
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
         Ok(vec![action[0] * (GOAL - start[0]) / GOAL; FRAMES])
     }

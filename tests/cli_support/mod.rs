@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Settings under which a whole run takes a second or two; their results mean nothing.
+/// Settings under which a whole run takes a second or two; the results have no meaning.
 pub const TINY: [&str; 11] = [
     "explorer.iterations=1",
     "explorer.population=4",
@@ -18,7 +18,7 @@ pub const TINY: [&str; 11] = [
     "expected.rounds=0",
 ];
 
-/// A folder that goes away, in which commands run.
+/// A temporary folder in which commands run.
 pub struct Workplace {
     folder: tempfile::TempDir,
 }
@@ -42,7 +42,7 @@ impl Workplace {
         std::fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
-    /// Names in the folder, sorted, hidden ones too.
+    /// Names in the folder, sorted, including hidden ones.
     pub fn names(&self) -> Vec<String> {
         names(self.folder.path())
     }
@@ -62,7 +62,7 @@ impl Workplace {
     }
 }
 
-/// Names in a folder, sorted, hidden ones too.
+/// Names in a folder, sorted, including hidden ones.
 pub fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries

@@ -1,4 +1,4 @@
-//! The program itself, and what it leaves.
+//! Runs the program and reads its output.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -16,7 +16,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// A file of JSON.
+/// Reads a JSON file.
 pub fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }

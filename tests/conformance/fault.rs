@@ -1,4 +1,4 @@
-//! What can be wrong with an engine.
+//! The faults that an engine can have.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -6,97 +6,97 @@ use std::sync::{Mutex, PoisonError};
 use asid::core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use asid::core::simulator::{StepHook, StepView};
 
-/// What is wrong with an engine.
+/// A fault of an engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Nothing.
+    /// No fault.
     None,
-    /// Nothing: Runge and Kutta's integrator of fourth order, where the engine has one.
+    /// No fault: a Runge-Kutta integrator of fourth order, where the engine has one.
     FourthOrder,
-    /// Sliding friction of every geom is half of what the scene says.
+    /// Sliding friction of every geom is half of the scene's value.
     FrictionHalved,
-    /// The friction of the larger of two geoms counts, whatever their priorities.
+    /// The larger friction of two geoms applies, whatever their priorities.
     PriorityIgnored,
-    /// Explicit pairs of geoms are not read.
+    /// Explicit pairs of geoms are ignored.
     PairsIgnored,
-    /// Joints are not damped.
+    /// Joints have no damping.
     DampingIgnored,
-    /// Ranges of joints are neither claimed nor refused.
+    /// Joint ranges do not act, and the capability is not claimed.
     RangesLeftOut,
-    /// Angles of a document are radians.
+    /// Angles of a document are taken as radians.
     DegreesIgnored,
     /// Limits of commands and forces do not act.
     LimitsIgnored,
-    /// The last of several actuators does nothing.
+    /// The last of several actuators has no effect.
     TorqueIgnored,
-    /// Quaternions are read as x y z w.
+    /// Quaternions are read in the order x y z w.
     QuaternionSwapped,
-    /// Sensors of joints read degrees.
+    /// Joint sensors read degrees.
     DegreesRead,
-    /// Sensors show the frame before.
+    /// Sensors show the previous frame.
     StaleSensor,
-    /// Readings carry the noise of one random state that all batches share.
+    /// Readings have noise from one random state that all batches share.
     SharedNoise,
     /// The result depends on the number of threads.
     ThreadDependent,
-    /// A restored state has no velocity.
+    /// A restored state has zero velocity.
     ForgetsVelocity,
-    /// A reset keeps a little of what was.
+    /// A reset leaves a trace of the previous state.
     ResetRemembers,
-    /// A snapshot of any scene is taken for one of this scene, and does nothing.
+    /// A snapshot of any scene is accepted, and has no effect.
     AnySnapshot,
-    /// A simulation's parameters are set for all.
+    /// Parameters of one simulation are set in all.
     SharedParameters,
-    /// Parameters do not change during a rollout.
+    /// Parameter changes during a rollout have no effect.
     ChangesIgnored,
     /// Torques of external wrenches are lost.
     WrenchTorqueLost,
     /// External forces act with the opposite sign.
     ForceReversed,
-    /// Simulations that are not asked for move as well.
+    /// Simulations outside of the request also move.
     OthersMove,
-    /// From the 1025th on, simulations stand still.
+    /// Simulations after the 1024th stand still.
     LargeBatchCut,
-    /// Simulations may be named in any order, and are taken in theirs.
+    /// Simulations may be named in any order, but are taken in ascending order.
     OrderIgnored,
-    /// A diverged simulation says that it runs.
+    /// A diverged simulation reports that it runs.
     DivergenceHidden,
-    /// Commands that are not finite are taken for zero.
+    /// Commands that are not finite are taken as zero.
     NanAccepted,
-    /// A hook is shown the state of the step before.
+    /// A hook gets the state of the previous step.
     HookLate,
-    /// A hook is told the time since the rollout began.
+    /// A hook gets the time since the rollout began.
     HookForgetsTime,
-    /// A hook is told the number of the simulation for the row of the rollout.
+    /// A hook gets the index of the simulation in place of the rollout's row.
     HookCountsSimulations,
-    /// A hook is there, and what is read is another number by its last bit.
+    /// With a hook, readings differ in their last bit.
     HookDisturbs,
-    /// The axes of a body's inertia are those of the body.
+    /// The axes of a body's inertia are taken as those of the body.
     InertiaTurnIgnored,
     /// A hook's force on a free joint acts at the centre of mass.
     HookForceAtCenter,
-    /// A mass that is set leaves the inertia as it was.
+    /// Setting a mass leaves the inertia as it is.
     MassWithoutInertia,
-    /// A mass may be set, and does nothing.
+    /// A mass can be set, but has no effect.
     MassUnused,
-    /// A negative mass is taken for its magnitude.
+    /// A negative mass is taken as its absolute value.
     NegativeMass,
     /// `frameangvel` of a site reads in the site's frame.
     RateInOwnFrame,
-    /// `gyro` reads in the world.
+    /// `gyro` reads in the world frame.
     GyroInWorld,
-    /// `velocimeter` reads in the world.
+    /// `velocimeter` reads in the world frame.
     VelocimeterInWorld,
-    /// A site is turned as its body.
+    /// A site has the orientation of its body.
     SiteTurnIgnored,
-    /// Equalities are left out.
+    /// Equality constraints are ignored.
     EqualitiesLeftOut,
-    /// The air is left out.
+    /// Density, viscosity and wind of the air are ignored.
     AirLeftOut,
 }
 
 impl Fault {
-    /// Every fault.
+    /// All faults of a whole engine.
     pub const ALL: [Self; 29] = [
         Self::FrictionHalved,
         Self::PriorityIgnored,
@@ -129,7 +129,7 @@ impl Fault {
         Self::HookDisturbs,
     ];
 
-    /// What an engine of free bodies can have wrong about a body.
+    /// Faults in the bodies of an engine of free bodies.
     pub const OF_FREE_BODIES: [Self; 12] = [
         Self::InertiaTurnIgnored,
         Self::HookForceAtCenter,
@@ -145,8 +145,8 @@ impl Fault {
         Self::DampingIgnored,
     ];
 
-    /// True where an engine that does everything is spoilt by it: what takes contact, and
-    /// the commonest of the others.
+    /// Whether a full engine is tested with this fault: all faults of contact, and the commonest
+    /// others.
     pub fn of_a_whole_engine(self) -> bool {
         !self.of_a_mechanism()
             || matches!(
@@ -160,7 +160,7 @@ impl Fault {
             )
     }
 
-    /// True where an engine of mechanisms without contact can have it.
+    /// Whether an engine of mechanisms without contact can have this fault.
     pub fn of_a_mechanism(self) -> bool {
         !matches!(
             self,
@@ -173,15 +173,15 @@ impl Fault {
 pub struct SpoiltHook<'a> {
     /// The hook of the rollout.
     pub inner: &'a dyn StepHook,
-    /// How it is called.
+    /// The fault of the call.
     pub fault: Fault,
-    /// Simulations of the rollout.
+    /// Indices of the rollout's simulations.
     pub sims: &'a [usize],
     /// Length of a physics step, s.
     pub timestep: f64,
     /// Centre of mass in the first body's frame, m.
     pub center: Vector3<f64>,
-    /// State of each row a step ago.
+    /// Positions and speeds of each row one step before.
     pub before: Mutex<HashMap<usize, [Vec<f64>; 2]>>,
 }
 

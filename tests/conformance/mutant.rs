@@ -1,5 +1,4 @@
-//! An engine with one fault: another engine behind a wrapper that spoils what
-//! passes through it.
+//! An engine with one fault: a wrapper around another engine that corrupts inputs and outputs.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -24,7 +23,7 @@ pub struct Mutant<'a> {
 }
 
 impl<'a> Mutant<'a> {
-    /// Spoils an engine.
+    /// Adds a fault to an engine.
     pub fn new(inner: &'a dyn Backend, fault: Fault) -> Self {
         Self { inner, fault }
     }
@@ -62,7 +61,7 @@ impl Backend for Mutant<'_> {
                 }
                 None => scene.xml().to_owned(),
             },
-            // Far enough that nothing gets there.
+            // So far away that nothing reaches it.
             Fault::RangesLeftOut => rewritten(scene.xml(), "range", |_| "-1e5 1e5".into()),
             Fault::DegreesIgnored => {
                 scene
@@ -102,7 +101,7 @@ impl Backend for Mutant<'_> {
             Fault::AirLeftOut => ["density", "viscosity", "wind"].iter().fold(
                 scene.xml().to_owned(),
                 |xml, attribute| {
-                    // Of the air, not of a geom.
+                    // The attributes of the air, not those of a geom.
                     xml.replace(&format!("<option {attribute}="), "<option iterations=")
                 },
             ),
@@ -130,7 +129,7 @@ fn rewritten(xml: &str, attribute: &str, change: impl Fn(&str) -> String) -> Str
     out
 }
 
-/// A document whose elements of a kind are not turned by a quaternion.
+/// A document whose elements of a kind have no rotation by a quaternion.
 fn upright(xml: &str, element: &str) -> String {
     let mut parts = xml.split(element);
     let mut out = parts.next().unwrap_or_default().to_owned();
@@ -142,7 +141,7 @@ fn upright(xml: &str, element: &str) -> String {
     out
 }
 
-/// Centre of mass of the first body that states one.
+/// Centre of mass of the first body that states one, in the body's frame, m.
 fn center(xml: &str) -> Vector3<f64> {
     let place = xml.split_once("<inertial pos=\"").unwrap_or_default().1;
     let place = place.split('"').next().unwrap_or_default();
@@ -176,7 +175,7 @@ impl Model for MutantModel {
         let mut config = config.clone();
         let mut more = Vec::new();
         if self.fault == Fault::MassWithoutInertia {
-            // The inertia is a parameter that stays.
+            // The inertia becomes a parameter that keeps its value.
             for target in config.targets.clone().into_iter().filter(mass) {
                 for index in 0..3 {
                     let target: Target = format!("body/{}/inertia/{index}", target.name).parse()?;
@@ -203,16 +202,16 @@ struct MutantSimulator {
     fault: Fault,
     threads: usize,
     running: Vec<Status>,
-    /// Centre of mass of the first body.
+    /// Centre of mass of the first body, in the body's frame, m.
     center: Vector3<f64>,
-    /// Nominal value of each parameter that is a mass.
+    /// Nominal value of each parameter that is a mass, kg.
     masses: Vec<Option<f64>>,
     /// Values of parameters that the caller does not know of.
     more: Vec<f64>,
 }
 
 impl MutantSimulator {
-    /// Spoils rows of readings, `frames` a simulation.
+    /// Corrupts rows of readings, `frames` per simulation.
     fn spoil(&self, record: &Recording, frames: usize, out: &mut [f64]) {
         let width = record.width();
         if width == 0 || frames == 0 {
@@ -280,7 +279,7 @@ impl MutantSimulator {
         }
     }
 
-    /// Commands with the last of several actuators at zero, or without NaN.
+    /// Commands with zero for the last of several actuators, or with zero in place of NaN.
     fn commands(&self, values: &[f64]) -> Vec<f64> {
         let nu = self.inner.layout().nu().max(1);
         let mut values = values.to_vec();
@@ -300,7 +299,7 @@ impl MutantSimulator {
         values
     }
 
-    /// Simulations as they are taken.
+    /// Simulations in the order in which they are taken.
     fn order(&self, sims: &[usize]) -> Vec<usize> {
         let mut sims = sims.to_vec();
         if self.fault == Fault::OrderIgnored {

@@ -1,5 +1,5 @@
-//! An engine that can do less: another engine behind a wrapper that claims fewer
-//! capabilities, and refuses whatever needs one that it does not claim.
+//! An engine with fewer capabilities: a wrapper around another engine that claims fewer of them and
+//! refuses whatever needs the others.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub struct Narrow<'a> {
 }
 
 impl<'a> Narrow<'a> {
-    /// Narrows an engine to those of its capabilities that are in `bits`.
+    /// Restricts an engine to those of its capabilities that are in `bits`.
     pub fn new(inner: &'a dyn Backend, bits: Capabilities) -> Self {
         Self {
             inner,
@@ -38,7 +38,7 @@ fn require(bits: Capabilities, needed: Capabilities) -> Result<()> {
     })
 }
 
-/// What a document needs of an engine.
+/// Capabilities that a document needs.
 fn needed(xml: &str) -> Capabilities {
     let document = Document::parse(xml).unwrap();
     let mut bits = Capabilities::empty();
@@ -102,7 +102,7 @@ fn of_geom(node: &Node<'_, '_>) -> Capabilities {
     bits
 }
 
-/// What a target needs of an engine.
+/// Capabilities that a target needs.
 fn of_target(target: &Target) -> Capabilities {
     match (&*target.element, &*target.attribute, target.index) {
         ("geom", "friction", 0) => Capabilities::CONTACT,

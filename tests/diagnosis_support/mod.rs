@@ -1,11 +1,11 @@
-//! What tests of diagnoses have in common.
+//! Shared parts of the tests of diagnoses.
 
 use std::sync::Arc;
 
 use asid::core::registry::{BackendEntry, all};
 use asid::core::{Backend, Capabilities};
 
-/// The engine that diagnoses by default: in double precision where one is built in.
+/// Returns the default engine of a diagnosis: one in double precision, if one is built in.
 pub fn engine() -> Arc<dyn Backend> {
     let mut made: Vec<Arc<dyn Backend>> = all::<BackendEntry>()
         .into_iter()

@@ -95,8 +95,10 @@ fn readings(
     Ok(out.iter().map(|x| x.to_bits()).collect())
 }
 
-/// Calls `check` for each effect at each of its sites: at null values, and half-way to the far end
-/// of the range.
+/// Calls `check` for each effect at each of its sites, at null values and at others.
+///
+/// The other values are 2 % of the way to the upper end of the range, or 99.9 % of the way to the
+/// lower end where the null value is the upper end.
 fn each_at_each_site(xml: &str, mut check: impl FnMut(&dyn Backend, &str, EffectSpec, EffectSpec)) {
     let plant = Plant::of(&scene(xml)).unwrap();
     for backend in engines(Capabilities::STEP_HOOKS) {

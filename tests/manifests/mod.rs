@@ -1,9 +1,9 @@
-//! Manifests of the workspace as tests of independence read them: text alone, so that no crate is needed.
+//! The workspace's manifests for tests of independence: read as text, so that no crate is needed.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Names of the dependencies of a manifest, those of tests and of building included.
+/// Names of the dependencies of a manifest, including those of tests and build scripts.
 pub fn dependencies(manifest: &str) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     let mut inside = false;
@@ -19,7 +19,7 @@ pub fn dependencies(manifest: &str) -> BTreeSet<String> {
     found
 }
 
-/// All manifests below a folder but those below build folders.
+/// Collects all manifests below a folder, except those in build folders.
 pub fn manifests(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
         let (path, name) = (entry.path(), entry.file_name());
@@ -32,7 +32,7 @@ pub fn manifests(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Asserts that no manifest of the workspace names a crate, but those in folders that may.
+/// Asserts that no manifest of the workspace names a crate, except in folders that may.
 pub fn assert_unused(root: &Path, name: &str, may: impl Fn(&Path) -> bool) {
     let mut all = Vec::new();
     manifests(root, &mut all);

@@ -12,8 +12,10 @@ const NATIVE: [(&str, bool); 3] = [
     ("logs", cfg!(feature = "logs")),
 ];
 
-/// What cargo is to build. With all features it is what these tests are a part of, of which every crate is there already: packages by
-/// themselves would compile all of them once more, with other features.
+/// Returns the cargo arguments that select what to build.
+///
+/// With all features it is the workspace that these tests are part of, whose crates are all built
+/// already. Single packages would compile all of them once more with other features.
 fn selection(packages: &[&str]) -> Vec<String> {
     if NATIVE.iter().all(|(_, is_on)| *is_on) {
         let names = NATIVE.map(|(name, _)| name).join(",");
@@ -22,12 +24,16 @@ fn selection(packages: &[&str]) -> Vec<String> {
     packages.iter().map(|p| format!("--package={p}")).collect()
 }
 
-/// Set where the caller has built everything already, as `cargo xtask test` has. Cargo puts the libraries and the program in their
-/// places anew at every call where the file system links no files, and a test beside it then finds none for a moment.
+/// Environment variable that is set if the caller has already built everything, as
+/// `cargo xtask test` does.
+///
+/// On file systems without links, each cargo call writes the libraries and the program anew. A
+/// parallel test then finds none for a moment.
 const BUILT: &str = "ASID_TESTS_PLUGINS_ARE_BUILT";
 
-/// Builds packages of this workspace as their authors would, next to the program under
-/// test, and returns what they make: shared libraries and programs, in the order of `packages`.
+/// Builds packages of this workspace as their authors would, next to the program under test.
+///
+/// Returns the resulting shared libraries and programs in the order of `packages`.
 pub fn build(packages: &[&str]) -> Vec<PathBuf> {
     let program = Path::new(env!("CARGO_BIN_EXE_asid"));
     let folder = program.parent().unwrap();
@@ -40,7 +46,8 @@ pub fn build(packages: &[&str]) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Calls cargo, once for each selection: what a test has loaded must not be replaced for another.
+/// Calls cargo once for each selection, because a library that a test has loaded must not be
+/// replaced.
 fn build_once(packages: &[&str], target: &Path) {
     static DONE: Mutex<BTreeSet<Vec<String>>> = Mutex::new(BTreeSet::new());
     let mut done = DONE.lock().unwrap();
@@ -63,7 +70,7 @@ fn build_once(packages: &[&str], target: &Path) {
     );
 }
 
-/// The library or the program of a package.
+/// Returns the library or the program of a package.
 fn made(folder: &Path, package: &str) -> PathBuf {
     let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = folder.join(format!("{prefix}{}{suffix}", package.replace('-', "_")));

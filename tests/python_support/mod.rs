@@ -1,4 +1,4 @@
-//! Dataclasses of Python out of JSON schemas.
+//! Generates Python dataclasses from JSON schemas.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use schemars::Schema;
 use serde_json::{Map, Value};
 
-/// What the file begins with.
+/// Beginning of the file.
 const HEAD: &str = "\
 \"\"\"What the program writes as ``result.json``, as dataclasses.
 
@@ -31,15 +31,15 @@ from asid.records import Record, Result
 Array = NDArray[np.float64]
 ";
 
-/// Names that every result has beside its fields.
+/// Attributes of every result besides its fields.
 const TAKEN: [&str; 6] = ["folder", "frame", "from_json", "log", "read", "report"];
 
-/// Classes by name.
+/// Generated classes and kinds, by name.
 #[derive(Default)]
 pub struct Generator {
-    /// In the order of the results: name and text.
+    /// Name and text of each class, in the order of the results.
     classes: Vec<(String, String)>,
-    /// Names of kinds: texts of which one is given.
+    /// Names of kinds: sets of texts, one of which is given.
     kinds: BTreeMap<String, String>,
 }
 
@@ -61,7 +61,7 @@ impl Generator {
         self.class(title, root, "Result");
     }
 
-    /// The whole file.
+    /// Returns the whole file.
     pub fn text(&self) -> String {
         let mut text = HEAD.to_owned();
         for (name, choice) in &self.kinds {
@@ -88,7 +88,7 @@ impl Generator {
         let properties = schema["properties"]
             .as_object()
             .expect("a class has fields");
-        // What may be left out stands behind what may not, as Python wants it.
+        // Optional fields come after required ones, as Python demands.
         let (given, optional): (Vec<_>, Vec<_>) = properties
             .iter()
             .partition(|(name, _)| required.contains(&name.as_str()));
@@ -129,7 +129,7 @@ fn documented(text: &mut String, field: &Value) {
     }
 }
 
-/// The texts of which a value is one, where it is of such a type.
+/// Returns the type of a value that is one of several texts; `None` for other types.
 fn choice(schema: &Map<String, Value>) -> Option<String> {
     let texts: Vec<&str> = match (schema.get("enum"), schema.get("oneOf")) {
         (Some(all), _) => all.as_array()?.iter().filter_map(Value::as_str).collect(),
@@ -179,7 +179,7 @@ fn named(name: &str, schema: &Map<String, Value>) -> String {
                 return format!("tuple[{}]", parts.join(", "));
             }
             match schema.get("items").map(hint).as_deref() {
-                // Of numbers, and of rows of numbers.
+                // Arrays of numbers, and of rows of numbers.
                 Some("float" | "Array") => "Array".to_owned(),
                 Some(item) => format!("list[{item}]"),
                 None => "list[Any]".to_owned(),

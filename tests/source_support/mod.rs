@@ -8,7 +8,8 @@ pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Source files below a folder, but for those of tests, examples and builds; `crates` says whether those of crates inside of it count.
+/// Source files below a folder, except those of tests, examples and builds. `crates` says whether
+/// to include crates inside of it.
 pub fn sources(folder: &Path, crates: bool) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {

@@ -1,4 +1,4 @@
-//! Problems of built-in tasks on the engines that are built in.
+//! Problems of built-in tasks on the built-in engines.
 
 pub mod visits;
 
@@ -14,7 +14,7 @@ pub fn task(name: &str) -> Box<dyn Task> {
     (find::<TaskEntry>(name).unwrap().make)().unwrap()
 }
 
-/// Calls `check` with a problem on an engine, and the scene that it compiled.
+/// Calls `check` with a problem on an engine, and with the compiled model.
 pub fn on_engine(
     backend: &dyn Backend,
     task: &dyn Task,

@@ -1,11 +1,12 @@
-//! Where a tracked object went in an episode: its path, how far it came, and how evenly it visited the
-//! parts of the floor.
+//! The path of a tracked object in an episode: its places, its displacement, and how evenly it
+//! visited the parts of the floor.
 
 use asid::core::episode::Episode;
 use asid::core::task::Outline;
 
-/// Places of an object in the plane, m, one a reading of the sensor of its position; readings that
-/// are missing are passed over. Empty where the log has no such sensor.
+/// Positions of an object in the plane, m, one per reading of its position sensor.
+///
+/// Missing readings are skipped. The path is empty if the log has no such sensor.
 #[must_use]
 pub fn path(episode: &Episode, position: &str) -> Vec<[f64; 2]> {
     let Some(range) = episode.channel(position).filter(|r| r.len() >= 2) else {
@@ -20,7 +21,7 @@ pub fn path(episode: &Episode, position: &str) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Distance from the first place of a path to its last, m; 0 for an empty one.
+/// Distance from the first position of a path to its last, m; 0 for an empty path.
 #[must_use]
 pub fn displacement(path: &[[f64; 2]]) -> f64 {
     match (path.first(), path.last()) {
@@ -29,8 +30,10 @@ pub fn displacement(path: &[[f64; 2]]) -> f64 {
     }
 }
 
-/// Share of a path's places that lie in each region; NaN for an empty path. What lies in none of
-/// them counts for none, so the shares sum to 1 at most where regions do not overlap.
+/// Share of a path's positions in each region; NaN for an empty path.
+///
+/// A position outside of all regions counts for none. If regions do not overlap, the shares
+/// therefore sum to at most 1.
 #[must_use]
 pub fn shares(path: &[[f64; 2]], regions: &[Outline]) -> Vec<f64> {
     regions
@@ -42,8 +45,10 @@ pub fn shares(path: &[[f64; 2]], regions: &[Outline]) -> Vec<f64> {
         .collect()
 }
 
-/// How evenly regions were visited: the entropy of the shares over that of equal shares. 1 where every
-/// region has the same, 0 where one has all; NaN where nothing lies in any, or there are not two regions.
+/// How evenly regions were visited: the entropy of the shares over that of equal shares.
+///
+/// It is 1 if all regions have equal shares, and 0 if one has all. It is NaN if all shares are
+/// zero, or if there are fewer than two regions.
 #[must_use]
 pub fn coverage(shares: &[f64]) -> f64 {
     let total: f64 = shares.iter().sum();
@@ -60,7 +65,7 @@ pub fn coverage(shares: &[f64]) -> f64 {
     (entropy / (shares.len() as f64).ln()).abs()
 }
 
-/// Whether a point lies in a polygon, by the number of its edges to the right of the point.
+/// Whether a point is in a polygon, by the number of edges to the right of the point.
 #[must_use]
 pub fn contains(corners: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
     let n = corners.len();
@@ -96,10 +101,10 @@ mod tests {
         assert!((coverage(&even) - 1.0).abs() < 1e-12);
         let one = shares(&[[0.5, 0.5], [0.2, 0.1]], &regions);
         assert_eq!((one[0], coverage(&one)), (1.0, 0.0));
-        // Two of three alike.
+        // Equal shares of two of three regions.
         let two = shares(&[[0.5, 0.5], [1.5, 0.5]], &regions);
         assert!((coverage(&two) - 2_f64.ln() / 3_f64.ln()).abs() < 1e-12);
-        // Outside counts for none of them.
+        // A position outside of all regions counts for none.
         let outside = shares(&[[0.5, 0.5], [9.0, 9.0]], &regions);
         assert_eq!(outside, [0.5, 0.0, 0.0]);
         assert!(coverage(&[0.0, 0.0]).is_nan());

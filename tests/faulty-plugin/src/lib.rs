@@ -1,6 +1,6 @@
-//! A plugin for tests, of which every part fails in its own way.
+//! A plugin for tests, each part of which fails in its own way.
 //!
-//! The tasks are `payload-swing` with one method that fails.
+//! The tasks are `payload-swing` with one failing method.
 
 use asid_core::explore::{Explored, Explorer, Policy};
 use asid_core::identify::{Identified, Identifier};
@@ -15,7 +15,7 @@ use payload_swing::PayloadSwing;
 
 asid_plugin::export_plugin!();
 
-/// What fails.
+/// The part of a task that fails.
 #[derive(Clone, Copy, PartialEq)]
 enum Fault {
     OutcomePanics,
@@ -142,7 +142,7 @@ faulty_explorers! {
             std::panic::resume_unwind(payload);
         }
     },
-    // A reading without values: an index beyond the end, on the side of the task.
+    // A reading without values: an index out of bounds, on the task's side.
     "explore-makes-the-task-panic": |problem| drop(problem.task.locate(&[])),
     "act-panics": |_| {},
 }
@@ -163,7 +163,7 @@ impl Explorer for FaultyExplorer {
     }
 }
 
-/// A policy that panics, when it is used and once more when it is dropped.
+/// A policy that panics when it is used, and again when it is dropped.
 struct PanickingPolicy;
 
 impl Policy for PanickingPolicy {
@@ -184,7 +184,7 @@ impl Drop for PanickingPolicy {
     }
 }
 
-/// An identifier whose result is spoilt in one way.
+/// An identifier with a result that is corrupted in one way.
 struct FaultyIdentifier(fn(&mut Identified));
 
 macro_rules! faulty_identifiers {
