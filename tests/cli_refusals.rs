@@ -1,4 +1,4 @@
-//! Bad input: one clear line on standard error, exit status 2, nothing on the disk.
+//! Bad input: one clear line on standard error, exit status 2, and no files.
 
 #![allow(clippy::unwrap_used)]
 
@@ -6,7 +6,7 @@ mod cli_support;
 
 use cli_support::{Workplace, tiny};
 
-/// Runs a command that must be refused with a line that holds all of `expected`.
+/// Asserts that a command is refused with a line that contains all of `expected`.
 fn refused(place: &Workplace, arguments: &[&str], expected: &[&str]) {
     let before = place.names();
     let output = place.run(arguments);
@@ -23,9 +23,9 @@ fn refused(place: &Workplace, arguments: &[&str], expected: &[&str]) {
     assert_eq!(place.names(), before, "{arguments:?} left something");
 }
 
-/// A refused run with these options.
+/// Asserts that a run with these options is refused.
 fn refused_run(place: &Workplace, options: &[&str], expected: &[&str]) {
-    // Were it not refused it would soon be over.
+    // If it is not refused, it ends soon.
     let mut arguments = tiny(&["run", "rod-balancing"]);
     if !options.contains(&"--out") {
         arguments.extend(["--out", "out"]);
@@ -51,7 +51,7 @@ fn unknown_names_list_the_near_ones() {
         ("--solver", "xyz", "`cem`"),
         ("--truth", "mass_ofset=0.1", "`mass_offset`"),
         ("--sed", "1", "'--seed'"),
-        // A TOML file, which repeats a run, could not hold it.
+        // A TOML file, which repeats a run, cannot hold it.
         (
             "--seed",
             "9223372036854775808",
@@ -96,7 +96,7 @@ fn settings_that_make_no_sense_are_named() {
             refused_run(&place, &["--set", &format!("{key}={value}")], &[key]);
         }
     }
-    // A key is named as it is set, wherever its value is checked.
+    // A message names a key as the user sets it, wherever its value is checked.
     for (key, value) in [("ppo.gamma", "2"), ("ppo.minibatch", "1")] {
         let key = format!("explorer.{key}");
         let setting = format!("{key}={value}");
@@ -120,7 +120,7 @@ fn unknowns_that_cannot_be_identified_are_refused() {
         ("target=geom/nothing/pos/1", "unknown geom `nothing`"),
         ("target=geom/rod_mass/pos/9", "index 9"),
         ("target=geom/rod_mass/colour", "`colour`"),
-        // A geom that is there and touches nothing.
+        // An existing geom that touches nothing.
         (
             "target=geom/link1_shape/friction/0",
             "geom/link1_shape/friction/0",
@@ -162,7 +162,7 @@ fn a_folder_that_cannot_take_a_result_is_refused_before_work() {
     place.write("old/result.json", "{}");
     refused_run(&place, &["--out", "old"], &["another run"]);
     assert_eq!(place.read("old/result.json"), "{}");
-    // A kernel's file system takes no folders, whoever asks.
+    // The kernel's file system accepts no new folders from any user.
     if std::path::Path::new("/proc/self").exists() {
         refused_run(&place, &["--out", "/proc/asid"], &["cannot be written"]);
     }
@@ -173,7 +173,7 @@ fn a_folder_that_cannot_take_a_result_is_refused_before_work() {
         &["exists already"],
     );
     assert_eq!(place.read("scene.xml"), "mine");
-    // Difficulties belong to tasks.
+    // Only tasks have difficulties.
     let export = ["export", "scene.xml", "--out", "plain.xml"];
     refused(
         &place,
@@ -257,7 +257,7 @@ fn bad_logs_name_row_and_column() {
         &format!("time,{}\n0,0,0,0,0,0,0,0,0,0\n", actuators.join(",")),
         &["no column of a sensor"],
     );
-    // A column that the model does not know is passed over.
+    // A column that the model does not know is ignored.
     identify(
         &format!("{header},rod_spin\n{},1\n", row("0", "0.5")),
         &["1 rows"],

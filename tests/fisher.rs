@@ -1,5 +1,7 @@
-//! Information of episodes against derivatives that are known: a cart of mass `m` under a force moves by
-//! `s = C / m`, whatever the engine's integrator, so that `ds/dm = -s / m`.
+//! Information of episodes compared with known derivatives.
+//!
+//! A cart of mass `m` under a force moves by `s = C / m`, whatever the engine's integrator, so that
+//! `ds/dm = -s / m`.
 
 #![allow(clippy::unwrap_used)]
 
@@ -16,17 +18,18 @@ use cart_support::{Cart, FRAME, HORIZON, NOISE};
 
 const FORCE: f64 = 2.0;
 
-/// What an episode under a constant force gave.
+/// An episode under a constant force.
 struct Episode {
-    /// How far the cart has moved at each reading, m.
+    /// Displacement of the cart at each reading, m.
     moved: Vec<f64>,
     /// `tr I` of the unknown after each control step.
     trace: Vec<f64>,
-    /// Expected deviation of the unknown after each control step, in prior deviations.
+    /// Expected standard deviation of the unknown after each control step, in standard deviations
+    /// of the prior.
     std: Vec<f64>,
 }
 
-/// Information about the mass of an episode at `mass` on every engine.
+/// Calls `check` on every engine with the information about the mass of an episode at `mass`.
 fn on_every_engine(
     mass: f64,
     scale: Scale,
@@ -54,7 +57,7 @@ fn on_every_engine(
                 episode.trace.push(batch.information()[0].trace());
                 episode.std.push(batch.information()[0].expected_std()[0]);
             }
-            // Newton, to the integrator's error of one physics step.
+            // Newton's law, up to the integrator's error of one physics step.
             let t = HORIZON as f64 * FRAME;
             let newton = FORCE * t * t / (2.0 * mass);
             let last = episode.moved[HORIZON - 1];
@@ -80,7 +83,8 @@ fn settings(form: Form, nuisance: bool) -> FisherSettings {
     FisherSettings {
         form,
         nuisance,
-        // The difference over 0.02 deviations is off the derivative by a share of 1e-4.
+        // The difference over 0.02 standard deviations differs from the derivative by a relative
+        // 1e-4.
         delta: 0.02,
         ..FisherSettings::default()
     }
@@ -107,8 +111,8 @@ fn the_trajectory_form_is_the_derivative_of_the_trajectory() {
 
 #[test]
 fn the_one_step_form_is_the_derivative_of_a_step() {
-    // From the state at its beginning, velocity included, a step differs by what the force adds in it:
-    // what it adds to a cart at rest, however fast the cart is.
+    // Each step begins from the same state, velocity included. It therefore differs only by what
+    // the force adds in it, which does not depend on the speed.
     for mass in [0.8, 1.7] {
         let one = settings(Form::OneStep, false);
         on_every_engine(mass, Scale::Linear, &one, |engine, episode| {
@@ -127,7 +131,8 @@ fn a_start_pose_that_is_not_known_costs_what_schurs_complement_says() {
     let both = settings(Form::Trajectory, true);
     let start = 0.2 / 12_f64.sqrt();
     on_every_engine(mass, Scale::Linear, &both, |engine, episode| {
-        // Columns: the mass, and the start, which moves every reading alike, the first one too.
+        // Columns: the mass, and the initial position, which shifts every reading equally,
+        // including the first.
         let slopes: Vec<f64> = std::iter::once(0.0)
             .chain(
                 episode
@@ -144,14 +149,14 @@ fn a_start_pose_that_is_not_known_costs_what_schurs_complement_says() {
         let ss = 1.0 + n * shift * shift;
         let wanted = (mm - ms * ms / ss).sqrt().recip();
         close(engine, episode.std[HORIZON - 1], wanted, 5e-3);
-        // It costs something.
+        // The unknown initial position costs information.
         assert!(wanted > 1.2 / mm.sqrt());
     });
 }
 
 #[test]
 fn a_step_that_the_range_cuts_short_is_divided_by_what_was_taken() {
-    // At the end of its range the mass can only be lowered: the difference is one-sided.
+    // At the end of its range the mass can only be lowered, so the difference is one-sided.
     let mass = 2.0;
     let delta = 0.3;
     let cut = FisherSettings {
@@ -172,7 +177,7 @@ fn a_step_that_the_range_cuts_short_is_divided_by_what_was_taken() {
             })
             .sum();
         close(engine, episode.trace[HORIZON - 1], wanted, 1e-4);
-        // Divided by the whole step of 2 delta it would be a quarter of that.
+        // Divided by the full step of 2 delta, the information would be a quarter of that.
         let derivative: f64 = episode
             .moved
             .iter()
@@ -206,7 +211,7 @@ fn curvature_counts_as_noise_where_roughness_is_asked_for() {
     });
 }
 
-/// A learner must not go on in an episode that the engine gave up.
+/// A learner must not continue in an episode that the engine has given up.
 #[test]
 fn a_diverged_episode_ends_and_is_worth_nothing() {
     let task = Cart::new();
@@ -219,7 +224,8 @@ fn a_diverged_episode_ends_and_is_worth_nothing() {
             let mut environment = FisherEnvironment::new(problem, &settings, 2).unwrap();
             let len = environment.observation_len();
             let mut observation = vec![0.0; 2 * len];
-            // The second cart stands where a double resolves no step: engines give it up.
+            // The second cart is so far away that double precision resolves no step: engines give
+            // it up.
             let begun = environment.begin_at(&[2.0, 2.0], &[0.02, 1e30], &mut observation);
             if begun.is_err() {
                 return;

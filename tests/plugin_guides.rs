@@ -1,5 +1,5 @@
-//! The guides to tasks, algorithms and effects: their commands are run outside of the
-//! repository, and their code is that of the examples.
+//! The guides to tasks, algorithms and effects. Their commands run outside of the repository, and
+//! their code is that of the examples.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]
@@ -55,7 +55,7 @@ fn code_in_the_guides_is_that_of_the_examples() {
     }
 }
 
-/// Follows a guide's first commands in an empty folder; work is cut short where `settings` allow.
+/// Follows a guide's first commands in an empty folder; `settings` shorten the work.
 fn follow(guide: &str, settings: &[&str]) {
     let place = Workplace::new();
     let program = Path::new(env!("CARGO_BIN_EXE_asid"));
@@ -68,7 +68,7 @@ fn follow(guide: &str, settings: &[&str]) {
             false => format!("{line}\n"),
         })
         .collect();
-    // What is built of the dependencies is kept for the next time.
+    // Builds of the dependencies are kept for the next time.
     let kept = program.parent().unwrap().parent().unwrap().join("guides");
     let script = script.replace("target/release", &format!("{}/release", kept.display()));
     let path = format!(
@@ -98,7 +98,7 @@ fn follow(guide: &str, settings: &[&str]) {
     );
 }
 
-/// Words in brackets or code marks of a text that look like the way to a file of the repository.
+/// Words in brackets or code marks of a text that look like paths of files in the repository.
 fn ways(text: &str) -> Vec<&str> {
     let links = text.split("](").skip(1);
     let links = links.filter_map(|rest| rest.split(')').next());
@@ -130,7 +130,7 @@ fn guides_of_a_new_plugin_lead_nowhere_that_is_not_there() {
     }
 }
 
-/// Symptom: a new plugin had paths of the machine that built the program.
+/// Symptom: a new plugin has absolute paths of the machine that built the program.
 #[test]
 fn a_new_plugin_has_no_absolute_paths() {
     let place = Workplace::new();

@@ -1,5 +1,5 @@
-//! Plugins in Rust, built and loaded as their authors would: a task, an explorer, an effect,
-//! and a program that links one.
+//! Plugins in Rust, built and loaded as their authors would: a task, an explorer, an effect, and a
+//! program that links one.
 
 #![allow(clippy::unwrap_used)]
 
@@ -30,14 +30,14 @@ fn all() -> Vec<&'static str> {
         .collect()
 }
 
-/// Standard output of a command that succeeds.
+/// Returns the standard output of a command that succeeds.
 fn done(output: Output) -> String {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The search for a good exploration, shortened.
+/// Settings for a short search of an exploration.
 const QUICK: [&str; 2] = ["--set", "explorer.iterations=2"];
 
 #[test]
@@ -59,7 +59,7 @@ fn the_list_tells_where_everything_comes_from() {
 #[test]
 fn a_loaded_task_runs_like_a_built_in_one_and_its_settings_repeat_the_run() {
     let place = Workplace::new();
-    // A truth of the task's own: at the light end of the prior the peak hangs on the damping.
+    // A truth of the task's own: at the light end of the prior the peak depends on the damping.
     let run = ["run", "payload-swing", "--seed", "1", "--quiet", "--out"];
     let light = ["--set", "condition=\"light\""];
     let plugin = ["--plugin", text(&LIBRARIES[0])];
@@ -79,7 +79,7 @@ fn a_loaded_task_runs_like_a_built_in_one_and_its_settings_repeat_the_run() {
     assert_eq!(again["parameters"], result["parameters"]);
 }
 
-/// The line on standard error of a call that is wrong.
+/// Returns the one line on standard error of a refused call.
 fn refused(output: &Output) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{said}");
@@ -118,9 +118,9 @@ fn plugins_of_a_configuration_run_only_where_they_are_trusted_and_the_ones_that_
         "{said}"
     );
     done(place.run(&[&again[..], &["b", "--trust-plugins"]].concat()));
-    // Whoever names the file trusts it.
+    // Naming the file means to trust it.
     done(place.run(&[&again[..], &["c", "--plugin", text(&library)]].concat()));
-    // Another library in its place: nothing of it is run.
+    // Another library in its place: nothing of it runs.
     std::fs::write(&library, std::fs::read(&LIBRARIES[1]).unwrap()).unwrap();
     let said = refused(&place.run(&[&again[..], &["d", "--trust-plugins"]].concat()));
     assert!(
@@ -219,7 +219,7 @@ fn folders_are_searched_and_a_name_that_is_taken_gets_a_suffix() {
         assert!(said.contains(from), "{said}");
     }
     assert!(place.read("scene.xml").contains("payload"));
-    // The same file twice is one plugin.
+    // The same file named twice is one plugin.
     let named = place.path(&format!("listed/swing{suffix}"));
     let rows = run(&["list", "--plugin", text(&named)]);
     assert!(!rows.contains("@plugin2"), "{rows}");
@@ -229,7 +229,8 @@ fn folders_are_searched_and_a_name_that_is_taken_gets_a_suffix() {
 fn a_program_that_links_a_plugin_has_the_whole_command_line() {
     let program = plugin_support::build(&["my-asid"]).remove(0);
     let mut command = std::process::Command::new(program);
-    // Built beside the tests it has their native libraries, without a place to find them at.
+    // The program is built next to the tests and needs their native libraries, without a path to
+    // them.
     let libraries = [("MUJOCO_DYNAMIC_LINK_DIR", ""), ("LIBTORCH", "lib")];
     let folders = libraries.iter().filter_map(|(variable, below)| {
         let folder = std::env::var_os(variable)?;

@@ -1,5 +1,5 @@
-//! The rod task's physics on every engine that is built in: what identification and
-//! the task rely on, without any learning.
+//! The rod task's physics on every built-in engine: what identification and the task rely on,
+//! without any learning.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
@@ -53,7 +53,8 @@ fn attempts(problem: &Problem<'_>, cases: &[(f64, f64)]) -> Vec<asid::core::task
 #[test]
 fn a_rod_laid_down_at_its_center_of_mass_stays_and_35_mm_off_it_falls() {
     on_every_engine(0, |engine, problem| {
-        // The ledge is 40 mm wide and the grip slips by at most 3 mm: 10 mm is well inside, 35 mm well outside.
+        // The ledge is 40 mm wide and the grip slips by at most 3 mm: 10 mm is well inside, 35 mm
+        // well outside.
         for offset in [-0.08, 0.0, 0.08] {
             let center = 0.75 * offset;
             let cases = [-0.035, -0.01, 0.0, 0.01, 0.035].map(|e| (offset, center + e));
@@ -101,7 +102,8 @@ fn a_narrow_ledge_lets_fall_what_a_wide_one_holds() {
     }
 }
 
-/// A push along the table tells the friction that slows the rod, where that is sought along.
+/// A push along the table is informative about the friction that slows the rod, if that is an
+/// unknown.
 #[test]
 fn a_push_tells_the_friction_too() {
     let task = task_support::task("rod-balancing");
@@ -124,7 +126,8 @@ fn a_push_tells_the_friction_too() {
                 "{}: expected deviations {prior:.4?} to {after:.4?}",
                 entry.name
             );
-            // The hand stops; how far the rod slides on, and how it turns, depends on the friction.
+            // The hand stops. How far the rod slides on, and how it rotates, depends on the
+            // friction.
             assert!(
                 after[1] < 0.7 * prior[1],
                 "{}: {prior:?} to {after:?}",
@@ -134,7 +137,7 @@ fn a_push_tells_the_friction_too() {
     }
 }
 
-/// Fewer readings tell less, and no less than their number says.
+/// Fewer or noisier readings are less informative, in proportion to their number and noise.
 #[test]
 fn a_slower_and_noisier_tracker_tells_less() {
     let task = task_support::task("rod-balancing");
@@ -160,28 +163,29 @@ fn a_slower_and_noisier_tracker_tells_less() {
     };
     let every = std(&[("tracker_rate", 50.0)]);
     let fifth = std(&[("tracker_rate", 10.0)]);
-    // A reading every fifth frame: a fifth of the information, if it comes evenly.
+    // A reading every fifth frame has a fifth of the information, if the information is spread
+    // evenly.
     let ratio = fifth / every;
     assert!((1.8..2.7).contains(&ratio), "{ratio}");
-    // Five times the noise, a twenty-fifth of the information.
+    // Five times the noise leaves a twenty-fifth of the information.
     let noisy = std(&[("tracker_noise", 0.01), ("tracker_angle_noise", 0.05)]);
     assert!((noisy / every - 5.0).abs() < 0.1, "{}", noisy / every);
 }
 
-/// Tracking the inertial frame of the rod (MuJoCo's `objtype="body"`) put the centre of mass into
-/// every reading: the answer was there before the rod was touched.
+/// Guards against tracking the inertial frame of the rod (MuJoCo's `objtype="body"`). Every reading
+/// would then contain the centre of mass, even before the rod is touched.
 #[test]
 fn readings_before_contact_do_not_tell_the_mass_offset() {
     on_every_engine(0, |engine, problem| {
         let protocol = problem.task.exploration();
         let start: Vec<f64> = protocol.start.iter().map(|c| c.center()).collect();
-        // Ten control steps of standing still.
+        // Ten control steps at rest.
         let actions = vec![0.0; 10 * protocol.action.len()];
         let settings = FisherSettings::default();
         let told = episode_information(problem, &settings, &[0.0], &start, &actions).unwrap();
         let (before, after) = (told.expected_std[0][0], told.expected_std[10][0]);
-        // The soft table lets the rod lean by 1 mrad at most, a tenth of the noise of one reading: of the
-        // prior's deviation less than a tenth goes.
+        // The soft table lets the rod lean by 1 mrad at most, a tenth of the noise of one reading.
+        // The prior's standard deviation shrinks by less than a tenth.
         assert!(after > 0.9 * before, "{engine}: {before} to {after}");
     });
 }
@@ -247,7 +251,7 @@ fn one_push_identifies_the_offset_and_the_interval_holds_it() {
             "{engine}: {marginal:?}"
         );
         assert!(marginal.std < 0.02, "{engine}: {marginal:?}");
-        // The start pose is found better than the first reading shows it (2 mm).
+        // The initial pose is found more precisely than the first reading shows it (2 mm).
         let error = (found.starts[0][0] - 0.55).hypot(found.starts[0][1]);
         assert!(error < 0.004, "{engine}: {error}");
     });
@@ -261,7 +265,8 @@ fn the_likelihood_of_the_truth_is_what_the_noise_makes_it() {
         let real = world.explore(&mut Push).unwrap();
         let mut likelihood =
             Likelihood::new(problem, std::slice::from_ref(&real.episode), 1).unwrap();
-        // The point of the truth: the start pose as an offset from what the first reading shows.
+        // The point of the truth, with the initial pose as an offset from the one that the first
+        // reading shows.
         let n = likelihood.dimension();
         let zero = vec![0.0; n];
         let located = likelihood.start(&zero, 0);
@@ -274,8 +279,8 @@ fn the_likelihood_of_the_truth_is_what_the_noise_makes_it() {
         }
         let residual = likelihood.residuals(&[point]).unwrap().remove(0).unwrap();
         let mean = residual.iter().map(|x| x * x).sum::<f64>() / likelihood.present() as f64;
-        // 606 readings: the mean square is 1 within 4 deviations of sqrt(2 / 606) = 0.057. The start
-        // goes through a division and back, which moves contacts by rounding.
+        // 606 readings: the mean square is 1 within 4 standard deviations of sqrt(2 / 606) = 0.057.
+        // The initial pose goes through a division and back, which moves contacts by rounding.
         assert!((mean - 1.0).abs() < 0.3, "{engine}: {mean}");
     });
 }
@@ -301,7 +306,7 @@ fn the_planner_touches_the_rod_wherever_it_lies() {
             &real.actions,
         )
         .unwrap();
-        // Without a touch the prior's deviation of 58 mm stays.
+        // Without contact the prior's standard deviation of 58 mm remains.
         let std = told.expected_std.last().unwrap()[0];
         assert!(std < 0.03, "{engine}: {std}");
     });

@@ -1,5 +1,5 @@
-//! The simulated real world: touches that are shorter than a frame, trackers with systematic errors,
-//! and chance that is the same for every method.
+//! The simulated real world: contacts shorter than a frame, trackers with systematic errors, and
+//! random numbers that are the same for every method.
 
 #![allow(clippy::unwrap_used)]
 
@@ -15,7 +15,7 @@ use asid::core::{
 use asid::worlds::{SimulatedWorld, TrackerErrors};
 use std::sync::Arc;
 
-/// A striker flies at 2 m/s against a ball: they touch for some milliseconds.
+/// A striker moves at 2 m/s towards a ball; they touch for some milliseconds.
 const SCENE: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/><worldbody>
   <body name="striker" pos="0 0 1"><joint name="striker" type="slide" axis="1 0 0"/>
     <geom name="striker" type="sphere" size="0.02" mass="0.1" solref="0.004 1"/></body>
@@ -123,8 +123,8 @@ fn tap() -> Tap {
     }
 }
 
-/// Wherever between two frames, and between two physics steps, the tap falls: a ball that moved was
-/// touched, in one control step of the two.
+/// The tap may be at any time between two frames and two physics steps. A ball that moved was
+/// touched, in one of the two control steps.
 #[test]
 fn a_tap_between_two_frames_is_a_touch() {
     let task = tap();
@@ -148,7 +148,7 @@ fn a_tap_between_two_frames_is_a_touch() {
     }
 }
 
-/// Nothing is decided.
+/// A policy that leaves the action as it is.
 struct Nothing;
 
 impl TaskPolicy for Nothing {
@@ -157,7 +157,7 @@ impl TaskPolicy for Nothing {
     }
 }
 
-/// The scene where nothing is touched and the tracker sees the striker, which flies at 2 m/s.
+/// The scene without contact, with a tracker of the striker, which moves at 2 m/s.
 fn flight() -> (Tap, Arc<dyn Model>) {
     let mut task = tap();
     task.spec.exploration.signals = ["striker_pos", "striker_quat"]
@@ -192,8 +192,8 @@ fn world<'a>(
         .unwrap()
 }
 
-/// What flies at 2 m/s is seen 2 m/s times the latency behind, shifted by the offset, and the turn of the
-/// tracker is the turn of the reading.
+/// At 2 m/s an object is read behind its position by 2 m/s times the latency, and shifted by the
+/// offset. The tracker's rotation rotates the readings.
 #[test]
 fn a_late_tracker_shows_where_the_object_was() {
     let (task, model) = flight();
@@ -217,7 +217,7 @@ fn a_late_tracker_shows_where_the_object_was() {
             "row {k}: {row:?}"
         );
     }
-    // The start pose of the attempt is read by the same tracker, and what is measured of it is true.
+    // The same tracker reads the initial pose of the attempt; the measured outcome is the true one.
     let attempt = late.attempt(&mut Nothing).unwrap();
     assert!((0.0..0.04).contains(&attempt.believed_start[0]));
     let believed = attempt.believed_start[0];
@@ -232,7 +232,7 @@ fn a_late_tracker_shows_where_the_object_was() {
     }
 }
 
-/// Records what it is shown.
+/// Records the readings that it gets.
 struct Witness(Vec<Vec<f64>>);
 
 impl Policy for Witness {
@@ -261,7 +261,7 @@ fn readings_are_missing_at_the_trackers_rate_and_the_policy_has_the_last_one() {
         let there = episode.reading(k)[..7].iter().all(|x| x.is_finite());
         assert_eq!(there, k % 2 == 0, "row {k}");
     }
-    // Frame 5 is missing: the second action is decided on frame 4.
+    // Frame 5 is missing, so the second action is based on frame 4.
     assert_eq!(witness.0[1], episode.reading(4));
     let lost = TrackerErrors {
         dropout: 0.3,
@@ -280,7 +280,7 @@ fn readings_are_missing_at_the_trackers_rate_and_the_policy_has_the_last_one() {
                 .count()
         })
         .sum();
-    // 400 readings, 120 lost in expectation, with a deviation of 9.
+    // 400 readings: 120 are lost on average, with a standard deviation of 9.
     assert!((93..147).contains(&missing), "{missing}");
     for wrong in [
         TrackerErrors {
@@ -303,8 +303,8 @@ fn readings_are_missing_at_the_trackers_rate_and_the_policy_has_the_last_one() {
     }
 }
 
-/// Common random numbers: a method that explores and one that does not, with trackers that lose
-/// readings or do not, meet the same attempt.
+/// Common random numbers: the attempt is the same for methods with and without exploration, and for
+/// trackers with and without dropouts.
 #[test]
 fn every_method_meets_the_same_chance() {
     let (mut task, model) = flight();
@@ -338,9 +338,9 @@ fn every_method_meets_the_same_chance() {
     }
 }
 
-/// Goes for the object.
+/// Moves towards the object.
 struct Chase {
-    /// Where the hand's position begins in a reading.
+    /// Index of the hand's position in a reading.
     hand: usize,
 }
 
@@ -357,7 +357,7 @@ impl Policy for Chase {
     }
 }
 
-/// An object that lay still and lies elsewhere in the end was touched, in every task with an arm.
+/// In every task with an arm, an object that was at rest and ends elsewhere was touched.
 #[test]
 fn what_moved_was_touched() {
     for entry in all::<TaskEntry>() {
@@ -393,7 +393,7 @@ fn what_moved_was_touched() {
                 let [first, last] =
                     [0, real.episode.rows() - 1].map(|k| real.episode.reading(k)[..2].to_vec());
                 let way = (last[0] - first[0]).hypot(last[1] - first[1]);
-                // Five deviations of the noise, and nothing moves by itself.
+                // Five standard deviations of the noise, and nothing moves by itself.
                 if way > 0.02 {
                     moved += 1;
                     assert!(
