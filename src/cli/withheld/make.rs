@@ -53,10 +53,12 @@ pub struct Wanted {
     /// Make only worlds where everything else is a little off
     #[arg(long, requires = "make")]
     dirty: bool,
-    /// Plan causes for at least this excess gap, in noise floors; in dirty worlds for so many times that of the dirt
+    /// Plan causes for at least this excess gap, in noise floors; in dirty worlds for so many times
+    /// that of the dirt
     #[arg(long, value_name = "N", default_value_t = 0.0, requires = "make")]
     size: f64,
-    /// Give every log this fault, or none; the same seed with another fault of the log makes the same worlds [default: as they are dealt]
+    /// Give every log this fault, or none; the same seed with another fault of the log makes the
+    /// same worlds [default: as they are dealt]
     #[arg(long, value_name = "NAME", value_parser = faults(), requires = "make")]
     fault: Option<Fault>,
 }
