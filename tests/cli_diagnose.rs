@@ -213,10 +213,10 @@ fn rewrite_logs(study: &std::path::Path, anew: impl Fn(&str) -> String) {
     }
 }
 
-/// Two rows are fitted by an initial state whatever the machine is.
+/// An initial state can fit two rows of any machine.
 ///
-/// Guards against a verdict from the absence of a gap there, and against a panic where a known
-/// initial state and a column taken as late leave no rows.
+/// Guards against a verdict from the missing gap of such logs. Also guards against a panic: with a
+/// known initial state, a column taken as late leaves no rows.
 #[test]
 fn logs_of_too_few_rows_are_refused() {
     let folder = tempfile::tempdir().unwrap();

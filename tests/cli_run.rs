@@ -439,8 +439,8 @@ fn an_interrupted_run_leaves_nothing() {
     assert!(place.names().is_empty(), "{:?}", place.names());
 }
 
-/// Episodes of all explorers are evaluated with the same measure, which the report names. The path
-/// of a ball is drawn even though it has no heading.
+/// All explorers' episodes are evaluated with the same measure, so that they can be compared, and
+/// the report says so. The path of a ball is drawn even though it has no heading.
 #[test]
 fn a_report_names_the_explorers_objective_and_the_measure_apart() {
     let place = Workplace::new();

@@ -141,7 +141,7 @@ fn a_late_tracker_does_not_make_the_mass_certain_and_wrong() {
             let mut settings = (entry.defaults)();
             let prior = toml::Table::from_iter([("latency".to_owned(), prior.into())]);
             settings.insert("tracker".into(), toml::Value::Table(prior));
-            // No further search would correct what an identifier without latency leaves.
+            // Restarts do not reduce the residuals of an identifier that ignores the latency.
             if settings.contains_key("restarts") {
                 settings.insert("restarts".into(), 0.into());
             }

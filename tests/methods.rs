@@ -27,8 +27,8 @@ const SEEDS: u64 = 6;
 /// mass.
 const SOLVER: &str = "iterations = 6\npopulation = 12\nbelief_samples = 2";
 
-/// Relative error of the mass, in standard deviations of the prior, and distance from the goal, m,
-/// of one run.
+/// Error of the mass in standard deviations of the prior, and distance from the goal, m, of one
+/// run.
 fn run(name: &str, seed: u64) -> [f64; 2] {
     let method = Named::named(name).unwrap();
     let task = Cart::new();

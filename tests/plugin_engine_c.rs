@@ -136,8 +136,8 @@ fn principal_axes_may_be_turned() {
     build("plugins/engine-c", &["engine.c"], &flight);
     let sources = ["engine.c", "scene.c", "dynamics.c"];
     build("plugins/mechanism-c", &sources, &mechanism);
-    // The first principal axis is (1, 1, 0) of the body. The quaternion is half of the right angle
-    // about z, an eighth of a turn.
+    // The inertia is rotated by 45° about z, so that the first principal axis is (1, 1, 0) of the
+    // body.
     let (c, s) = (
         std::f64::consts::FRAC_PI_8.cos(),
         std::f64::consts::FRAC_PI_8.sin(),

@@ -1,5 +1,5 @@
-//! Faulty plugins, each actually built: one line names the file and the reason, and the exit status
-//! tells. No plugin crashes the program.
+//! Faulty plugins, each actually built: one line names the file and the reason, with a matching
+//! exit status. No plugin crashes the program.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used)]

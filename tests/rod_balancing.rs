@@ -190,7 +190,7 @@ fn readings_before_contact_do_not_tell_the_mass_offset() {
     });
 }
 
-/// The real world of a problem with this truth and start pose.
+/// The real world of a problem with this truth and initial pose.
 fn world<'a>(problem: &Problem<'a>, truth: &[f64], start: Vec<f64>) -> SimulatedWorld<'a> {
     let Problem {
         task,

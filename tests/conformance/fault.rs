@@ -21,7 +21,7 @@ pub enum Fault {
     PairsIgnored,
     /// Joints have no damping.
     DampingIgnored,
-    /// Joint ranges do not act, and the capability is not claimed.
+    /// Joint ranges are neither claimed nor refused, and do not act.
     RangesLeftOut,
     /// Angles of a document are taken as radians.
     DegreesIgnored,
@@ -96,7 +96,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// All faults of a whole engine.
+    /// All faults, except those that only [`Self::OF_FREE_BODIES`] has.
     pub const ALL: [Self; 29] = [
         Self::FrictionHalved,
         Self::PriorityIgnored,

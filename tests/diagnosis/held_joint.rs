@@ -1,5 +1,5 @@
-//! Two servos, integrated by hand. The gear of one nearly holds: its friction is 0.94 of the
-//! drive's torque.
+//! Two servos, integrated by hand. The gear of one nearly holds its joint: the friction is 0.94 of
+//! the drive's torque.
 
 use super::one_joint::{machine_log, normal};
 use super::world::write_files;

@@ -23,8 +23,8 @@ const ROW: f64 = 0.01;
 const STEP: f64 = 0.001;
 /// Standard deviation of a reading, m or rad.
 const NOISE: f64 = 1e-3;
-/// Dry friction of the real knee, N m, whose motor has up to 3: one stops the knee now and then,
-/// one holds it most of the time.
+/// Dry friction of the real knee, N m: one stops it now and then, one holds it most of the time.
+/// The motor's largest torque is 3.
 const STOPS: f64 = 1.0;
 const HOLDS: f64 = 2.5;
 

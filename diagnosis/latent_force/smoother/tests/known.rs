@@ -80,8 +80,8 @@ fn without_readings_nothing_is_learnt() {
 
 #[test]
 fn the_regression_is_the_same_over_more_rows_than_are_added_up_at_once() {
-    // The log-likelihood is quadratic in a coefficient: moving the readings by x changes it by b x
-    // - a x^2 / 2.
+    // The log-likelihood is quadratic in a coefficient: moving the readings by x changes it by
+    // `b x - a x^2 / 2`.
     let noise = NoiseModel {
         q: vec![0.5],
         tau: vec![0.3],

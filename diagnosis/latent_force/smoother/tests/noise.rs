@@ -30,8 +30,8 @@ fn wandering() -> Case {
 
 #[test]
 fn the_sums_are_the_slopes_of_the_likelihood() {
-    // Fisher's identity: the derivative with respect to ln v of a variance is (sum of squares / v -
-    // their number) / 2.
+    // Fisher's identity: the derivative with respect to ln v of a variance v is
+    // `(sum of squares / v - n) / 2` for n squares.
     let case = wandering();
     let smoothed = smooth(case.problem(), &case.noise);
     let step = 1e-4_f64;
