@@ -48,7 +48,7 @@ pub fn decimals(value: f64, decimals: usize) -> String {
     }
 }
 
-/// How finely a quantity is told, so that estimate, truth and interval compare at a glance.
+/// Number of digits of a quantity, so that estimate, truth and interval compare at a glance.
 ///
 /// ```
 /// use asid_report::number::Precision;

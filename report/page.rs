@@ -1,10 +1,9 @@
 //! The shell of a report: one HTML file with header, tiles, sections, figures and tables.
 //!
-//! The file is also well-formed XML, opens offline, follows the reader's light
-//! or dark preference, prints, and needs no script but to play the
-//! machine in 3-D. On a wide screen a
-//! section's title and introduction stand in the margin; on a phone all is one
-//! column and only tables scroll sideways.
+//! The file is also well-formed XML, opens offline, follows the reader's light or dark preference,
+//! and prints. Scripts are needed only for the interactive parts. On a wide screen a section's
+//! title and introduction stand in the margin. On a phone there is one column, and only tables
+//! scroll sideways.
 //!
 //! ```
 //! use asid_report::page::{Column, Page, Section, Table, Tile, Tone};

@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use asid_core::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Time between two lines where there is no terminal. A log of an hour gets few, and the first
-/// comes soon enough to show that work goes on.
+/// Time between two lines without a terminal. A log of an hour gets few lines, and the first comes
+/// soon enough to show that the work proceeds.
 const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
 /// A bar for each stage, one after the other; a line every half minute where standard error is no

@@ -1,4 +1,4 @@
-//! Where the ball goes on three patches of friction. Each patch tells of its own friction alone, so
+//! Where the ball goes on three patches of friction. Each patch reveals only its own friction, so
 //! an explorer that targets the unknowns sends the ball over all of them.
 
 use anyhow::Result;

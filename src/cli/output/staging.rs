@@ -1,5 +1,5 @@
-//! Folders in which a result is filled before it has its name, and what a process that was killed
-//! leaves of them.
+//! Folders in which a result is filled before it gets its name, and how leftovers of killed
+//! processes are recognised.
 //!
 //! ```text
 //! .asid-UNIQUE/lock       locked as long as the process that fills it lives
@@ -8,8 +8,8 @@
 //! .asid-UNIQUE/replaced   a folder in whose place the result is put
 //! ```
 //!
-//! The lock tells what is left over from what is in use, across containers and machines, where
-//! numbers of processes repeat.
+//! The lock distinguishes leftovers from folders in use, also across containers and machines, where
+//! process numbers repeat.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
