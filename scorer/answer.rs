@@ -1,7 +1,7 @@
-//! What a diagnosis said: the keys of its `result.json` that are scored.
+//! The answer of a diagnosis: the scored keys of its `result.json`.
 //!
-//! They are read as the contract has them and not as types of the diagnosis, so that any tool that writes such a file
-//! can be scored, and so that nothing of the diagnosis is inside of the stick.
+//! The keys follow the contract and not the types of the diagnosis. Any tool that writes such a
+//! file can therefore be scored, and the scorer shares nothing with the diagnosis.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,16 +9,16 @@ use std::path::Path;
 use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// Gaps on the logs held out, in units of the noise.
+/// Gaps on the held-out logs, in units of the noise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
-    /// After fitting the study's own parameters.
+    /// Gap after fitting the study's own parameters.
     #[serde(default)]
     pub identified: Option<f64>,
-    /// With the verdict's effects.
+    /// Gap with the verdict's effects.
     #[serde(default)]
     pub refined: Option<f64>,
-    /// Share of the excess that they close.
+    /// Share of the excess that the effects close.
     #[serde(default)]
     pub closed: Option<f64>,
     /// Noise by sensor.
@@ -26,19 +26,19 @@ pub struct Gap {
     pub signals: Vec<SignalNoise>,
 }
 
-/// Noise that the diagnosis took a sensor to have.
+/// Noise that the diagnosis assumed for a sensor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SignalNoise {
     /// Sensor.
     pub signal: String,
-    /// Deviation, in its unit.
+    /// Standard deviation, in the sensor's unit.
     pub noise: f64,
 }
 
-/// Kind of the verdict of an answer that names nothing, and takes what it learned off the residuals.
+/// Kind of a verdict that names nothing but subtracts learned residuals.
 pub const RESIDUAL: &str = "residual";
 
-/// A share of the excess.
+/// A share of the excess at one place.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// Column of the logs.
@@ -50,7 +50,7 @@ pub struct Place {
     pub share: f64,
 }
 
-/// A set of effects, `none` or `unknown`, with its probability.
+/// A set of effects, or `none` or `unknown`, with its probability.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hypothesis {
     /// Effects at their sites.
@@ -67,16 +67,16 @@ pub struct EffectValues {
     /// Site; empty for an effect of the whole scene.
     #[serde(default)]
     pub site: String,
-    /// Fitted values.
+    /// Fitted values of its parameters.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
-    /// Their 95 % intervals, where it gives any.
+    /// 95 % intervals of the values, if the answer gives any.
     #[serde(default)]
     pub intervals95: BTreeMap<String, [f64; 2]>,
 }
 
 impl EffectValues {
-    /// `NAME@SITE`.
+    /// `NAME@SITE`, or the name alone for an effect of the whole scene.
     #[must_use]
     pub fn label(&self) -> String {
         if self.site.is_empty() {
@@ -95,18 +95,18 @@ pub struct Verdict {
     /// Effects at their sites.
     #[serde(default)]
     pub effects: Vec<String>,
-    /// Probability.
+    /// Stated probability of the verdict.
     pub probability: f64,
-    /// Rival sets that the data cannot tell from it.
+    /// Rival sets that the data cannot distinguish from the verdict.
     #[serde(default)]
     pub ambiguous_with: Vec<Vec<String>>,
-    /// What is left beside it.
+    /// What the verdict leaves unexplained.
     #[serde(default)]
     pub remainder: Option<serde_json::Value>,
 }
 
 impl Verdict {
-    /// Its set of effects, sorted; `["none"]` or `["unknown"]` where it names none.
+    /// The verdict's set of effects, sorted; `[kind]`, for example `["none"]`, if it names none.
     #[must_use]
     pub fn set(&self) -> Vec<String> {
         if self.kind != "effects" {
@@ -118,7 +118,7 @@ impl Verdict {
     }
 }
 
-/// A parameter of the study.
+/// Estimate of a parameter of the study.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterEstimate {
     /// Name.
@@ -130,12 +130,12 @@ pub struct ParameterEstimate {
     pub interval95: Option<[f64; 2]>,
 }
 
-/// A fault of wiring that it found.
+/// A wiring fault that the diagnosis found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WiringFound {
-    /// `wiring-sign` and the like.
+    /// Name of the fault, for example `wiring-sign`.
     pub fault: String,
-    /// Columns concerned.
+    /// Affected columns.
     #[serde(default)]
     pub columns: Vec<String>,
     /// Probability.
@@ -143,7 +143,7 @@ pub struct WiringFound {
     pub probability: Option<f64>,
 }
 
-/// What a diagnosis said.
+/// The answer of a diagnosis.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// Gaps.
@@ -151,34 +151,36 @@ pub struct Answer {
     /// Where the gap lies.
     #[serde(default, rename = "where")]
     pub places: Vec<Place>,
-    /// Sets with probabilities.
+    /// Sets of effects with their probabilities.
     #[serde(default)]
     pub hypotheses: Vec<Hypothesis>,
-    /// Effects with values.
+    /// Effects with their fitted values.
     #[serde(default)]
     pub effects: Vec<EffectValues>,
     /// The verdict.
     pub verdict: Verdict,
-    /// The study's parameters.
+    /// Estimates of the study's parameters.
     #[serde(default)]
     pub parameters: Vec<ParameterEstimate>,
-    /// Faults of wiring.
+    /// Wiring faults.
     #[serde(default)]
     pub wiring: Vec<WiringFound>,
-    /// What it learned is left of the readings of the logs held out by a replay with the study's parameters: `rows x
-    /// entries` of each log, three an orientation, in the sensor's unit, rad of an orientation.
+    /// Learned residuals of the held-out logs, replayed with the study's fitted parameters.
+    ///
+    /// Each log has `rows x entries` values in the sensor's unit. An orientation has three entries,
+    /// in rad.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub learned: Vec<Vec<f64>>,
 }
 
-/// Probability of a fault of wiring from which on it counts as named: as likely as not.
+/// Probability from which a wiring fault counts as named: as likely as not.
 const NAMED: f64 = 0.5;
 
 impl Answer {
     /// Reads a `result.json`.
     ///
     /// # Errors
-    /// When the file is missing or is no result of a diagnosis.
+    /// If the file is missing or is not a result of a diagnosis.
     pub fn read(path: &Path) -> Result<Self> {
         let fail = |message: String| Error::File {
             path: path.to_owned(),
@@ -188,7 +190,7 @@ impl Answer {
         serde_json::from_str(&text).map_err(|e| fail(format!("is no result of a diagnosis: {e}")))
     }
 
-    /// Whether it says by no name what is missing.
+    /// Whether the answer gives no name for what is missing.
     #[must_use]
     pub fn names_nothing(&self) -> bool {
         self.verdict.kind == RESIDUAL
@@ -200,7 +202,7 @@ impl Answer {
         self.effects.iter().find(|e| e.label() == effect)
     }
 
-    /// Faults of wiring that it names: as likely as not, or without a probability.
+    /// Wiring faults that the answer names: as likely as not, or without a probability.
     pub fn named_wiring(&self) -> impl Iterator<Item = &WiringFound> {
         let named = |w: &&WiringFound| w.probability.is_none_or(|p| p >= NAMED);
         self.wiring.iter().filter(named)

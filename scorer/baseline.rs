@@ -1,7 +1,9 @@
-//! Baselines: answers that take no diagnosis. What a diagnosis is worth is what it is better than these.
+//! Baselines: answers without a diagnosis. A diagnosis is worth as much as it is better than these.
 //!
-//! They get the same studies, catalogue and engine, and the same scorer. They are what one would write in an afternoon:
-//! all effects at all sites are ranked by one linearisation each, the leading ones fitted by replays of the training
+//! They get the same studies, catalogue, engine and scorer. They are what one would write in an
+//! afternoon. All effects at all sites are ranked by one linearisation each. The leading ones are
+//! fitted by replays of the training logs, with residuals assumed white. None of them knows a
+//! label.
 //! logs, residuals taken for white noise. None of them knows a label.
 
 mod candidates;
@@ -27,17 +29,18 @@ use work::{Fitted, Work};
 /// A baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Baseline {
-    /// Fits the study's parameters, and says that nothing is missing.
+    /// Fits the study's parameters and answers that nothing is missing.
     IdentifyOnly,
     /// Names the single effect that leaves the smallest residual on the training logs.
     BestResidual,
-    /// Adds effects, and drops those before, for as long as the Bayesian information criterion (Schwarz 1978) falls.
+    /// Adds effects, and drops earlier ones, as long as the Bayesian information criterion (Schwarz
+    /// 1978) falls.
     Bic,
-    /// Names nothing: a network learns what is left of the readings.
+    /// Names nothing; a network learns the residuals.
     ResidualNetwork,
 }
 
-/// Effects that are added at most.
+/// Maximum number of effects that are added.
 const MOST_EFFECTS: usize = 3;
 
 impl Baseline {
@@ -53,10 +56,12 @@ impl Baseline {
     }
 }
 
-/// What a baseline says of the study in a folder, with a catalogue that lacks some effects; the seed is for one that learns.
+/// Answer of a baseline to the study in a folder.
+///
+/// The catalogue lacks the effects `without`. The seed is for a baseline that learns.
 ///
 /// # Errors
-/// When the study cannot be read or an engine fails.
+/// If the study cannot be read or an engine fails.
 pub fn answer(
     baseline: Baseline,
     backend: Arc<dyn Backend>,
@@ -99,7 +104,7 @@ pub fn answer(
             break;
         }
         best = leader;
-        // What was added before may be needed no more.
+        // Effects that were added earlier may no longer be needed.
         while let Some(fewer) = work.fewer(&tried[best])? {
             tried.push(fewer);
             best = tried.len() - 1;
@@ -117,7 +122,7 @@ pub fn answer(
     Ok(said(&study, &tried[best], weights))
 }
 
-/// Each set once, with the largest of its weights: a set may be reached by two ways.
+/// Returns each set once, with its largest weight; a set may be reached in two ways.
 fn each_once(weights: Vec<(Vec<String>, f64)>) -> Vec<(Vec<String>, f64)> {
     let mut sets: BTreeMap<Vec<String>, f64> = BTreeMap::new();
     for (set, weight) in weights {
@@ -127,7 +132,7 @@ fn each_once(weights: Vec<(Vec<String>, f64)>) -> Vec<(Vec<String>, f64)> {
     sets.into_iter().collect()
 }
 
-/// The answer: the set of `best`, and weights of all sets that were tried.
+/// The answer with the set of `best` and the weights of all sets that were tried.
 fn said(study: &Study, best: &Fitted, weights: Vec<(Vec<String>, f64)>) -> Answer {
     let total: f64 = weights.iter().map(|w| w.1).sum();
     let mut hypotheses: Vec<Hypothesis> = weights

@@ -1,4 +1,4 @@
-//! The scoreboard: all cases of a set, and parts of it.
+//! The scoreboard: all cases of a set, and groups of them.
 
 mod row;
 
@@ -12,34 +12,37 @@ use crate::statistics::{Calibration, Figure, Share};
 use crate::values::Estimate;
 pub use row::Row;
 
-/// Least probability in a logarithm: less than one case in a thousand cannot be checked with some hundred cases, and a
-/// single answer that is sure and wrong should not outweigh all others.
+/// Smallest probability in a logarithm.
+///
+/// A few hundred cases cannot verify a frequency below one in a thousand. A single answer that is
+/// sure and wrong should not outweigh all others.
 const FLOOR: f64 = 1e-3;
 
-/// Edges of the bins of a power curve, excess gaps in units of the noise: doublings from one that hardly shows.
+/// Edges of the bins of a power curve: excess gaps in units of the noise. They double from a gap
+/// that hardly shows.
 const EDGES: [f64; 7] = [0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
-/// Worlds without a cause.
+/// False alarms in worlds without a cause.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Alarms {
-    /// An effect is named that is not there, or dirt far too large.
+    /// Cases in which an effect is named that is absent, or dirt that is far too large.
     pub effect: Share,
-    /// `unknown` is said in a clean world.
+    /// Clean worlds with the answer `unknown`.
     pub unknown: Share,
-    /// `unknown` is said in a dirty world: neither right nor a false alarm.
+    /// Dirty worlds with the answer `unknown`: neither right nor a false alarm.
     pub apart: Share,
 }
 
-/// Cases whose causes stand out so far.
+/// Cases whose causes have an excess gap in one bin.
 #[derive(Clone, Debug, Serialize)]
 pub struct Power {
-    /// Smallest and largest excess gap, in units of the noise; null where there is no largest.
+    /// Smallest and largest excess gap, in units of the noise; null if there is no largest.
     pub gap: (f64, Option<f64>),
-    /// Mean of them.
+    /// Mean excess gap.
     pub mean_gap: f64,
-    /// Something was said to be there.
+    /// Cases in which something was named.
     pub noticed: Share,
-    /// The right thing was.
+    /// Cases with a right verdict.
     pub right: Share,
 }
 
@@ -48,7 +51,7 @@ pub struct Power {
 pub struct Errors {
     /// Median relative error.
     pub error: Option<Figure>,
-    /// 95 % intervals that hold the truth.
+    /// Share of 95 % intervals that contain the true value.
     pub covered: Share,
 }
 
@@ -63,57 +66,57 @@ impl Errors {
     }
 }
 
-/// Faults of wiring over all cases.
+/// Score of wiring faults over all cases.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct WiringScore {
     /// Faults found.
     pub found: Share,
-    /// Cases in which a fault is named that is not there.
+    /// Cases in which an absent fault is named.
     pub false_alarms: Share,
 }
 
-/// The score of one method on a set of cases; `result.json` of `withheld`.
+/// Score of one method on a set of cases; `result.json` of `withheld`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Score {
-    /// 1.
+    /// Version of the format: 1.
     pub schema: u32,
-    /// What answered: `diagnose`, or a baseline.
+    /// The method that answered: `diagnose` or a baseline.
     pub method: String,
-    /// Cases that count.
+    /// Number of cases that count.
     pub cases: usize,
-    /// Of these, right.
+    /// Number of right verdicts.
     pub right: usize,
-    /// Right, or among the two most probable sets.
+    /// Number of cases that are right, or have a right set among the two most probable.
     pub top2: usize,
-    /// Right, or in the ambiguity set.
+    /// Number of cases that are right, or have a right set in the ambiguity set.
     pub covered: usize,
-    /// Everything at once, then machine by machine and so on.
+    /// Rows: all cases, then machine by machine, and so on.
     pub rows: Vec<Row>,
-    /// Clean worlds without a cause.
+    /// False alarms in clean worlds without a cause.
     pub clean_alarms: Alarms,
-    /// Dirty worlds without a cause.
+    /// False alarms in dirty worlds without a cause.
     pub dirty_alarms: Alarms,
-    /// Causes of no catalogue that were called unknown.
+    /// Causes of no catalogue that were called `unknown`.
     pub unknowns: Share,
     /// Mean logarithm of the probability given to right sets.
     pub log_score: Option<Figure>,
-    /// The same of a guess by how often each cause occurs.
+    /// The log score of a guess by how often each cause occurs.
     pub base_log_score: f64,
-    /// Mean squared difference of the stated probability and what came true.
+    /// Mean squared difference of the stated probability and its event.
     pub brier: Option<Figure>,
-    /// Stated probabilities against what came true.
+    /// Calibration of the stated probabilities.
     pub calibration: Calibration,
-    /// Mean F1 of the columns where the excess is said to be.
+    /// Mean F1 of the columns in which the answer locates the excess.
     pub localization_signals: Option<Figure>,
-    /// Mean F1 of columns and regimes.
+    /// Mean F1 of columns with regimes.
     pub localization_regimes: Option<Figure>,
     /// Faults of wiring.
     pub wiring: WiringScore,
-    /// Values of effects that are rightly named.
+    /// Errors of the values of rightly named effects.
     pub effect_values: Errors,
-    /// Values of the study's parameters, in all cases with an answer.
+    /// Errors of the study's parameters, over all cases with an answer.
     pub parameters: Errors,
-    /// Share right by how far the causes stand out.
+    /// Share of right verdicts by the excess gap of the causes.
     pub power: Vec<Power>,
     /// Counts of truth and verdict, by names without sites.
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
@@ -121,13 +124,13 @@ pub struct Score {
     pub slowest: f64,
     /// Largest memory of a case, MiB.
     pub largest_memory_mib: Option<f64>,
-    /// Cases that the engine cannot simulate, with the reason; they count nowhere.
+    /// Cases that the engine cannot simulate, with the reason; no figure includes them.
     pub left_out: BTreeMap<String, String>,
     /// Each case.
     pub answers: Vec<Case>,
 }
 
-/// Names without sites.
+/// Names of a set without sites.
 fn plain(set: &[String]) -> String {
     if set.is_empty() {
         return "no answer".to_owned();
@@ -193,7 +196,8 @@ fn confusion(cases: &[Case]) -> BTreeMap<String, BTreeMap<String, usize>> {
 }
 
 impl Score {
-    /// Figures of some cases; `left_out` are those without one, with the reason.
+    /// Computes the figures of some cases; `left_out` holds the cases without figures, with the
+    /// reason.
     #[must_use]
     pub fn of(method: &str, answers: Vec<Case>, left_out: BTreeMap<String, String>) -> Self {
         let counted: Vec<&Case> = answers.iter().filter(|c| c.standing.counts()).collect();

@@ -1,9 +1,10 @@
-//! Lets this crate's tests find libtorch where they are built with the feature `torch`: an rpath to `$LIBTORCH/lib`.
+//! Lets this crate's tests find libtorch in builds with the feature `torch`: an rpath to
+//! `$LIBTORCH/lib`.
 //!
-//! Where LIBTORCH is not set (`LIBTORCH_USE_PYTORCH=1`, or a system-wide
-//! libtorch) nothing is added and the loader's own search path holds.
+//! If LIBTORCH is not set (`LIBTORCH_USE_PYTORCH=1`, or a system-wide libtorch), nothing is added
+//! and the loader's own search path decides.
 
-// A build script speaks to cargo through its standard output.
+// A build script talks to cargo through its standard output.
 #![allow(clippy::print_stdout)]
 
 use std::env;

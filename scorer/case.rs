@@ -1,4 +1,4 @@
-//! One case: what it is, what was said of it, how that stands.
+//! One case: its label, its answer and its score.
 
 use serde::Serialize;
 
@@ -12,29 +12,29 @@ use crate::wiring::Wiring;
 /// How a diagnosis ended.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// What it said; `Err` is why it said nothing.
+    /// Its answer, or the reason why there is none.
     pub answer: Result<Answer, String>,
     /// Wall time, s.
     pub seconds: f64,
-    /// Largest memory that its process held, MiB; `None` where the system does not say.
+    /// Peak memory of its process, MiB; `None` if the system does not report it.
     pub memory_mib: Option<f64>,
 }
 
-/// What a false alarm names.
+/// The kind of false alarm of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Alarm {
-    /// Nothing that is not there.
+    /// No false alarm.
     Quiet,
-    /// An effect that is not there, or dirt far too large.
+    /// An effect that is absent, or dirt that is far too large.
     Effect,
     /// `unknown` in a clean world.
     Unknown,
-    /// `unknown` in a dirty world: counted apart.
+    /// `unknown` in a dirty world: counted separately.
     Apart,
 }
 
-/// A case with its score.
+/// A scored case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Case {
     /// Name.
@@ -43,58 +43,59 @@ pub struct Case {
     pub world: String,
     /// `none`, `unknown`, `single`, `several` or `group`.
     pub kind: &'static str,
-    /// Causes without their sites.
+    /// Names of the causes without their sites.
     pub cause: String,
-    /// Whether everything is a little off.
+    /// Whether the world is dirty: everything deviates a little.
     pub dirty: bool,
-    /// How far the causes stand out of the dirt; 0 in clean worlds.
+    /// Multiple of the gap of the dirt that the causes reach; 0 in clean worlds.
     pub factor: f64,
     /// Excess gap of the causes, in units of the noise.
     pub cause_gap: f64,
     /// Faults of the log.
     pub log_faults: Vec<String>,
-    /// Faults of wiring, by name.
+    /// Names of the wiring faults.
     pub wiring_faults: Vec<String>,
-    /// What is the case.
+    /// The true set.
     pub truth: Vec<String>,
-    /// What was said; empty where nothing was.
+    /// The verdict's set; empty without an answer.
     pub verdict: Vec<String>,
-    /// Probability stated of it.
+    /// Stated probability of the verdict.
     pub probability: f64,
-    /// How it stands.
+    /// Standing of the verdict.
     pub standing: Standing,
-    /// Whether everything is so that it claims: the event of the stated probability.
+    /// Whether all claims of the verdict are true: the event of the stated probability.
     pub claims_hold: bool,
     /// Probability given to right sets.
     pub true_probability: f64,
-    /// Right, or a right set among the two most probable ones.
+    /// Whether it is right, or has a right set among the two most probable.
     pub top2: bool,
-    /// Right, or a right set among the rivals that it cannot tell from it.
+    /// Whether it is right, or has a right set among the rivals that it cannot distinguish from its
+    /// verdict.
     pub covered: bool,
-    /// Sets in the ambiguity set, the verdict included; 0 without an answer.
+    /// Number of sets in the ambiguity set, the verdict included; 0 without an answer.
     pub set_size: usize,
-    /// In a world without a cause: what the answer alarms of.
+    /// Kind of false alarm, in a world without a cause.
     pub alarm: Option<Alarm>,
-    /// Where.
+    /// Score of where the answer locates the excess.
     pub localization: Localization,
-    /// Wiring.
+    /// Score of the wiring faults.
     pub wiring: Wiring,
-    /// Values of effects that were rightly named.
+    /// Values of rightly named effects.
     pub effect_values: Vec<Estimate>,
     /// Values of the study's parameters.
     pub parameters: Vec<Estimate>,
-    /// What the scorer's own replays say.
+    /// Results of the scorer's own replays.
     pub physics: Physics,
     /// Wall time, s.
     pub seconds: f64,
-    /// Largest memory, MiB.
+    /// Peak memory, MiB.
     pub memory_mib: Option<f64>,
-    /// Why there is no answer.
+    /// Reason why there is no answer.
     pub failure: Option<String>,
 }
 
 impl Case {
-    /// Scores a run by its label, and by what the scorer's replays say of the verdict.
+    /// Scores a run by its label and by the scorer's replays of the verdict.
     #[must_use]
     pub fn new(name: &str, run: &Run, judge: &Judge<'_>, physics: Physics) -> Self {
         let label = judge.label;
@@ -147,7 +148,7 @@ impl Case {
         case
     }
 
-    /// Whether its answer may name what is missing; so also where there is none.
+    /// Whether its answer may name what is missing; also true without an answer.
     #[must_use]
     pub fn names(&self) -> bool {
         self.standing != Standing::NamesNothing

@@ -1,9 +1,9 @@
-//! What the catalogue says of an effect by its name.
+//! Looks up effects of the catalogue by name.
 
 use asid_core::registry::all;
 use asid_effects::{EffectEntry, EffectParameter};
 
-/// Parameters of an effect; `None` where the catalogue has no such effect.
+/// Parameters of an effect; `None` if the catalogue lacks the effect.
 #[must_use]
 pub fn parameters_of(name: &str) -> Option<&'static [EffectParameter]> {
     let entry = all::<EffectEntry>().into_iter().find(|e| e.name == name)?;

@@ -1,4 +1,4 @@
-//! Dirt that is named: right where the label lists it, unless it is named far too large.
+//! Named dirt is right if the label lists it, unless its fitted size is far too large.
 
 use std::collections::BTreeMap;
 
@@ -7,14 +7,18 @@ use crate::catalogue::parameters_of;
 use crate::label::{Label, name_of};
 use crate::sites::Sites;
 
-/// Largest ratio of the fitted to the drawn size at which named dirt is right. Dirt is near the noise, and its size is
-/// then known to about as much as itself.
+/// Largest ratio of fitted to drawn size at which named dirt is right.
+///
+/// Dirt is near the noise, so the error of its fitted size is about as large as the size itself.
 const LARGEST_RATIO: f64 = 2.0;
 
-/// Departures from the values at which the effect is off, by unit: parameters of one unit are parts of one size.
+/// Distances from the values at which the effect is off, by unit; parameters of one unit form one
+/// size.
 type Sizes = BTreeMap<&'static str, f64>;
 
-/// Sizes of an effect's values; a parameter that the catalogue does not know is off at 0 and has a unit of its own.
+/// Sizes of an effect's values.
+///
+/// A parameter that the catalogue lacks is off at 0 and has a unit of its own.
 fn sizes(effect: &str, values: &BTreeMap<String, f64>) -> Sizes {
     let known = parameters_of(name_of(effect)).unwrap_or_default();
     let mut squares = Sizes::new();
@@ -29,7 +33,8 @@ fn sizes(effect: &str, values: &BTreeMap<String, f64>) -> Sizes {
         .collect()
 }
 
-/// Whether `effect` (`NAME@SITE`) is in the label's list of dirt, and its fitted size at most twice the drawn one.
+/// Whether the label lists `effect` (`NAME@SITE`) as dirt, and its fitted size is at most twice the
+/// drawn one.
 #[must_use]
 pub fn is_listed(effect: &str, answer: &Answer, label: &Label, sites: &Sites) -> bool {
     let mut drawn = BTreeMap::new();
@@ -92,7 +97,7 @@ mod tests {
             let answer = named(&[("force", force), ("offset", 0.0)], "coulomb-friction");
             is_listed("coulomb-friction@axis", &answer, &label, &Sites::default())
         };
-        // Force and offset have one unit: the drawn size is 0.05.
+        // Force and offset have the same unit: the drawn size is 0.05.
         assert!(listed(0.099) && !listed(0.101));
         let other = named(&[("damping", 0.001)], "viscous-friction");
         assert!(!is_listed(

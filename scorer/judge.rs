@@ -1,9 +1,10 @@
-//! Whether an answer is right.
+//! Decides whether an answer is right.
 //!
-//! A verdict is right where it names the true set of effects, a set that the label accepts as well, or one that the
-//! scorer found to be the same physics. Listed dirt may stand beside any of them. In a world without a cause nothing but
-//! `none` is right, or listed dirt where there is some; `unknown` in such a dirty world is neither right nor wrong,
-//! since something is there that has no single name. Where the catalogue has not got the cause, `unknown` is right.
+//! A verdict is right if it names the true set of effects, another set that the label accepts, or a
+//! set that the scorer finds to be the same physics. It may name listed dirt in addition. In a
+//! world without a cause only `none` is right, or listed dirt if there is some. `unknown` in such a
+//! dirty world is neither right nor wrong, because the deviations there have no single name. If the
+//! catalogue lacks the cause, `unknown` is right.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +16,7 @@ use crate::label::{Label, name_of};
 use crate::sites::Sites;
 use crate::wiring::named_by_mending;
 
-/// How an answer stands.
+/// Standing of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Standing {
@@ -25,17 +26,17 @@ pub enum Standing {
     Acceptable,
     /// It names listed dirt in a world without a cause.
     Dirt,
-    /// Its set is the same physics in these logs.
+    /// It names a set that is the same physics in these logs.
     SamePhysics,
-    /// `unknown` of a cause that the catalogue has not got.
+    /// It says `unknown` of a cause that the catalogue lacks.
     OutOfCatalogue,
-    /// `unknown` in a dirty world without a cause: counted apart.
+    /// It says `unknown` in a dirty world without a cause: counted separately.
     Apart,
-    /// Another answer.
+    /// Any other answer.
     Wrong,
-    /// No answer: an error, or the time limit.
+    /// There is no answer: an error, or the time limit.
     NoAnswer,
-    /// An answer that says by no name what is missing: neither right nor wrong.
+    /// It gives no name for what is missing: neither right nor wrong.
     NamesNothing,
 }
 
@@ -72,12 +73,12 @@ impl Standing {
     }
 }
 
-/// What answers to a case are compared with.
+/// The truth with which answers to a case are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Judge<'a> {
-    /// The truth.
+    /// The label.
     pub label: &'a Label,
-    /// What names mean in this machine.
+    /// Meaning of names in this machine.
     pub sites: &'a Sites,
     /// Names of the effects that the diagnosis could name.
     pub catalogue: &'a BTreeSet<String>,
@@ -88,7 +89,7 @@ fn is(set: &[String], word: &str) -> bool {
 }
 
 impl Judge<'_> {
-    /// Whether a cause is not in the catalogue, though its name is agreed on.
+    /// Whether the catalogue lacks a cause whose name is agreed on.
     #[must_use]
     pub fn is_out_of_catalogue(&self) -> bool {
         let label = self.label;
@@ -113,7 +114,7 @@ impl Judge<'_> {
         }
     }
 
-    /// How a set stands, by its names.
+    /// Standing of a set by its names.
     #[must_use]
     pub fn of_set(&self, set: &[String], answer: &Answer) -> Standing {
         let label = self.label;
@@ -140,7 +141,7 @@ impl Judge<'_> {
         Standing::Wrong
     }
 
-    /// A set with the causes that the answer has named by mending columns.
+    /// Adds to a set the causes that the answer named by correcting columns.
     fn with_mended(&self, set: &[String], answer: &Answer) -> Vec<String> {
         let mended: Vec<String> = named_by_mending(self.label, answer).cloned().collect();
         if mended.is_empty() || is(set, "unknown") {
@@ -151,7 +152,7 @@ impl Judge<'_> {
         set.into_iter().collect()
     }
 
-    /// Whether `set` is `wanted`, but for listed dirt beside it.
+    /// Whether `set` is `wanted`, apart from listed dirt.
     fn agrees(&self, set: &[String], wanted: &[String], answer: &Answer) -> bool {
         // An empty set is accepted as `none`.
         if wanted.is_empty() {
@@ -169,8 +170,9 @@ impl Judge<'_> {
         dirt::is_listed(effect, answer, self.label, self.sites)
     }
 
-    /// Whether everything that the verdict claims is so: the event whose probability it states. Each effect that is
-    /// named is a cause, or listed dirt; `none` and `unknown` are right.
+    /// Whether all claims of the verdict are true: the event whose probability it states.
+    ///
+    /// Each named effect must be a cause or listed dirt; `none` and `unknown` must be right.
     #[must_use]
     pub fn claims_hold(&self, answer: &Answer, standing: Standing) -> bool {
         if standing.is_right() {
@@ -205,7 +207,7 @@ mod tests {
             sites: &sites,
             catalogue: &catalogue,
         };
-        // Whatever is named is named with a size of 1.
+        // Each named effect has a size of 1.
         let answer = Answer {
             effects: said
                 .iter()
@@ -248,7 +250,7 @@ mod tests {
     fn listed_dirt_is_right_unless_it_is_named_too_large() {
         assert_eq!(standing(&dirty(&[]), &["none"]), Standing::Right);
         assert_eq!(standing(&dirty(&[]), &["b@x"]), Standing::Dirt);
-        // Drawn 0.4, named 1.
+        // The drawn size is 0.4, the named size 1.
         assert_eq!(standing(&dirty(&[]), &["c@x"]), Standing::Wrong);
         assert_eq!(standing(&dirty(&[]), &["b@y"]), Standing::Wrong);
         assert_eq!(standing(&dirty(&[]), &["unknown"]), Standing::Apart);

@@ -1,7 +1,7 @@
-//! What a case is: an entry of `labels.json`.
+//! The label of a case: an entry of `labels.json`.
 //!
-//! The keys are a contract between whoever makes cases and whoever scores them. Only `effects` is always there; what a
-//! label does not say is not scored.
+//! The keys are a contract between the generator of cases and the scorer. Only `effects` is
+//! mandatory; what a label does not say is not scored.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use crate::catalogue::has_parameter;
 
-/// A little of an effect that the world has besides its causes.
+/// A small effect that the world has besides its causes.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Dirt {
     /// Name of the effect.
@@ -27,19 +27,19 @@ pub struct Dirt {
     pub excess_gap: f64,
 }
 
-/// A fault of how columns of the logs are wired to sensors.
+/// A fault in the wiring of log columns to sensors.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct WiringTruth {
-    /// `wiring-sign` and the like.
+    /// Name of the fault, for example `wiring-sign`.
     pub fault: String,
-    /// Columns concerned.
+    /// Affected columns.
     pub columns: Vec<String>,
     /// Factor, shift or delay, in SI units.
     #[serde(default)]
     pub value: f64,
 }
 
-/// A share of the true excess.
+/// A share of the true excess at one place.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct TruePlace {
     /// Column of the logs.
@@ -56,30 +56,30 @@ pub struct Label {
     /// Kind of machine.
     #[serde(default)]
     pub world: String,
-    /// Causes as `NAME@SITE`; none of them for no cause; `unknown:…` for one of no catalogue.
+    /// Causes as `NAME@SITE`; empty without a cause; `unknown:…` for a cause of no catalogue.
     pub effects: Vec<String>,
-    /// Their true values: `NAME@SITE.parameter`, or the bare parameter where that is clear.
+    /// True values, by `NAME@SITE.parameter`, or by the bare parameter name if that is unambiguous.
     #[serde(default)]
     pub effect_parameters: BTreeMap<String, f64>,
     /// True values of the study's parameters.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
-    /// Other sets of effects that are right; `["none"]` and `["unknown"]` are such sets.
+    /// Other sets of effects that are right, for example `["none"]` or `["unknown"]`.
     #[serde(default)]
     pub acceptable: Vec<Vec<String>>,
-    /// Effects that a right answer may not name.
+    /// Effects that a right answer must not name.
     #[serde(default)]
     pub must_not: Vec<String>,
-    /// Whether everything is a little off.
+    /// Whether the world is dirty: everything deviates a little.
     #[serde(default)]
     pub dirty: bool,
-    /// What is.
+    /// The items of dirt.
     #[serde(default)]
     pub dirt: Vec<Dirt>,
-    /// How far the causes stand out of the dirt; 0 where there are none, or no dirt.
+    /// Multiple of the gap of the dirt that the causes reach; 0 without causes or dirt.
     #[serde(default)]
     pub factor: f64,
-    /// Excess gap that the causes were sized for, in units of the noise.
+    /// Excess gap for which the causes were sized, in units of the noise.
     #[serde(default)]
     pub target_gap: f64,
     /// Excess gap of each cause alone.
@@ -91,7 +91,7 @@ pub struct Label {
     /// Share of the squared excess in each column of the logs.
     #[serde(default)]
     pub signals: BTreeMap<String, f64>,
-    /// The same by column and regime.
+    /// The same shares by column and regime.
     #[serde(default, rename = "where")]
     pub places: Vec<TruePlace>,
     /// Faults of wiring.
@@ -100,7 +100,7 @@ pub struct Label {
     /// Faults of the log itself.
     #[serde(default)]
     pub log_faults: Vec<String>,
-    /// Deviation of each sensor's noise, in its unit.
+    /// Standard deviation of each sensor's noise, in its unit.
     #[serde(default)]
     pub noise: BTreeMap<String, f64>,
 }
@@ -112,7 +112,7 @@ impl Label {
         self.effects.iter().any(|e| e.starts_with("unknown"))
     }
 
-    /// Whether nothing is the cause.
+    /// Whether there is no cause.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.effects.is_empty()
@@ -130,7 +130,7 @@ impl Label {
         names.join(" + ")
     }
 
-    /// `none`, `unknown`, `single`, `several` or `group`, the same effect at several sites.
+    /// `none`, `unknown`, `single`, `several` or `group` (the same effect at several sites).
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match &self.effects[..] {
@@ -142,8 +142,10 @@ impl Label {
         }
     }
 
-    /// Excess gap of the causes alone, in units of the noise: root of the sum of squares, which is exact where they act
-    /// on different readings; that of the whole world where the label does not have it by cause.
+    /// Excess gap of the causes alone, in units of the noise.
+    ///
+    /// It is the root of the sum of squares, which is exact if the causes act on different
+    /// readings. Without gaps by cause it is the gap of the whole world.
     #[must_use]
     pub fn cause_gap(&self) -> f64 {
         if self.own_gaps.is_empty() {
@@ -156,7 +158,7 @@ impl Label {
     #[must_use]
     pub fn value(&self, effect: &str, parameter: &str) -> Option<f64> {
         let whole = self.effect_parameters.get(&format!("{effect}.{parameter}"));
-        // A bare name is clear where no other cause could have it.
+        // A bare name is unambiguous if no other cause has that parameter.
         let has = |e: &&String| has_parameter(name_of(e), parameter);
         let mut owners = self.effects.iter().filter(has);
         let clear = owners.next().is_some_and(|e| e == effect) && owners.next().is_none();
@@ -184,7 +186,7 @@ pub fn site_of(effect: &str) -> &str {
 /// Reads `labels.json`.
 ///
 /// # Errors
-/// When the file is missing or is no set of labels.
+/// If the file is missing or is not a set of labels.
 pub fn read_labels(path: &Path) -> Result<BTreeMap<String, Label>> {
     let fail = |message: String| Error::File {
         path: path.to_owned(),

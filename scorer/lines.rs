@@ -3,7 +3,7 @@
 use crate::board::{Row, Score};
 use crate::statistics::{Figure, Share};
 
-/// Width of the names of rows and causes; longer ones are cut.
+/// Width of the names of rows and causes; longer names are cut.
 const NAME: usize = 40;
 
 fn cut(text: &str, width: usize) -> String {
@@ -38,7 +38,7 @@ pub fn figure(of: Option<&Figure>, scale: f64, decimals: usize) -> String {
     )
 }
 
-/// All scores of one set of cases: the first one whole, then each method's line.
+/// All scores of one set of cases: the first in full, then one line per method.
 #[must_use]
 pub fn lines(scores: &[Score]) -> Vec<String> {
     let mut lines = Vec::new();
@@ -132,7 +132,7 @@ fn rows(score: &Score) -> Vec<String> {
     lines
 }
 
-/// A line a method.
+/// One line per method.
 fn methods(scores: &[Score]) -> Vec<String> {
     let all = scores.iter().filter_map(|s| {
         let all = s.rows.first()?;

@@ -1,4 +1,4 @@
-//! Whether the places that a diagnosis lists are those where the true excess is.
+//! Compares the places that a diagnosis lists with those of the true excess.
 
 use std::collections::BTreeMap;
 
@@ -7,20 +7,21 @@ use serde::Serialize;
 use crate::answer::Answer;
 use crate::label::Label;
 
-/// Share of the excess from which on a place counts: ten equal places is as thin as an excess can be said to *lie*
-/// anywhere.
+/// Share of the excess from which a place counts: an excess spread over more than ten equal places
+/// cannot be said to *lie* anywhere.
 const COUNTS: f64 = 0.1;
 
 /// F1 scores (van Rijsbergen 1979) of the places with at least a tenth of the excess.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Localization {
-    /// By column of the logs; null where the label does not say where the excess is.
+    /// F1 by column of the logs; null if the label does not say where the excess is.
     pub signals: Option<f64>,
-    /// By column and regime of motion.
+    /// F1 by column and regime of motion.
     pub regimes: Option<f64>,
 }
 
-/// Harmonic mean of precision and recall of the keys with a share that counts; `None` where no true one has.
+/// F1 of the keys whose share counts: harmonic mean of precision and recall; `None` without a true
+/// key.
 fn f1(said: &BTreeMap<String, f64>, truth: &BTreeMap<String, f64>) -> Option<f64> {
     let counts = |shares: &BTreeMap<String, f64>| -> Vec<String> {
         let large = shares.iter().filter(|(_, share)| **share >= COUNTS);
@@ -39,8 +40,10 @@ fn sums(places: impl Iterator<Item = (String, f64)>) -> BTreeMap<String, f64> {
     sums
 }
 
-/// What a column stands for: itself, or the orientation that it is a number of. A log has four numbers of one, a residual three,
-/// so that only the orientation as a whole can be compared.
+/// The signal of a column: the column itself, or the orientation to which it belongs.
+///
+/// A log has four values of an orientation and a residual three, so only the whole orientation can
+/// be compared.
 fn signal<'a>(column: &'a str, label: &Label) -> &'a str {
     match column.rsplit_once('.') {
         Some((sensor, "0" | "1" | "2" | "3"))
@@ -53,7 +56,7 @@ fn signal<'a>(column: &'a str, label: &Label) -> &'a str {
 }
 
 impl Localization {
-    /// Of a case with an answer.
+    /// Scores the places of an answer.
     #[must_use]
     pub fn of(label: &Label, answer: &Answer) -> Self {
         let said = |key: &dyn Fn(&crate::answer::Place) -> String| {
@@ -99,7 +102,7 @@ mod tests {
             ],
             ..Answer::default()
         };
-        // One of two said is true, and one of two true is said.
+        // One of the two stated places is true, and one of the two true places is stated.
         let scored = Localization::of(&label, &answer);
         assert_eq!(scored.signals, Some(0.5));
         assert_eq!(scored.regimes, None);

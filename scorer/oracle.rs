@@ -1,14 +1,14 @@
-//! The answer of who knows the label: the scorer's own check.
+//! The answer of somebody who knows the label: a check of the scorer itself.
 //!
-//! Whatever a diagnosis says, this one is right. Where it is not scored so, or where the true effects leave a clean world
-//! off its logs, the fault is in the scorer, the generator or the catalogue, and not in a diagnosis.
+//! This answer is right by construction. If it is not scored as right, or if the true effects do
+//! not fit the logs of a clean world, the fault is in the scorer, the generator or the catalogue.
 
 use crate::answer::{
     Answer, EffectValues, Hypothesis, ParameterEstimate, Place, Verdict, WiringFound,
 };
 use crate::label::{Label, name_of, site_of};
 
-/// Says what a label says, with certainty.
+/// Answers with the content of a label, with certainty.
 #[must_use]
 pub fn oracle(label: &Label) -> Answer {
     let kind = match label.kind() {

@@ -10,20 +10,20 @@ use crate::lines::percent;
 use pictures::{machines, power, probabilities};
 use tables::{cases, confusion, methods, part};
 
-/// What the page tells besides the scores.
+/// Facts of the page besides the scores.
 #[derive(Clone, Debug, Default)]
 pub struct About {
     /// The call.
     pub command: String,
     /// Name and version of the engine.
     pub engine: String,
-    /// What a control has to show, where the check was spoilt on purpose.
+    /// Expected result of a control, in a check that was spoilt on purpose.
     pub control: Option<&'static str>,
-    /// Time that each case was given, s.
+    /// Time limit of each case, s.
     pub limit: Option<f64>,
 }
 
-/// The page of some scores on one set of cases, the first one's in full.
+/// The page of the scores on one set of cases; the first score is shown in full.
 #[must_use]
 pub fn page(scores: &[Score], about: &About) -> String {
     let Some(score) = scores.first() else {

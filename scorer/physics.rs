@@ -1,8 +1,9 @@
-//! What the scorer's own replays say: whether a verdict is the same physics as the truth, and how much of the gap that
-//! could be closed it closed.
+//! The scorer's own replays: whether a verdict is the same physics as the truth, and how much of
+//! the closable gap it closed.
 //!
-//! Nothing here searches. A set of effects that somebody names is put into the study's model and fitted, from the
-//! values that its author gives: the label's for the truth, the diagnosis' own for its verdict.
+//! Nothing here searches. A named set of effects is put into the study's model and fitted, starting
+//! from the values that its author gives. The truth starts from the label's values, the verdict
+//! from those of the diagnosis.
 
 mod bench;
 pub(crate) mod fit;
@@ -24,35 +25,37 @@ pub use study::Study;
 
 use bench::Bench;
 
-/// Gaps on the logs held out, root mean square in units of the noise, all by the same replays.
+/// Gaps on the held-out logs: root mean squares in units of the noise, all by the same replays.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gaps {
-    /// With the study's parameters fitted.
+    /// Gap with the study's parameters fitted.
     pub identified: f64,
-    /// As the diagnosis left the model: its parameters, its effects, its values.
+    /// Gap of the model of the diagnosis: its parameters, its effects, its values.
     pub refined: f64,
-    /// With the true effects fitted.
+    /// Gap with the true effects fitted.
     pub best: f64,
-    /// Share of what the true effects close that the diagnosis closed; null where they close nothing.
+    /// Share of what the true effects close that the diagnosis closed; null if they close nothing.
     pub closed_of_possible: Option<f64>,
 }
 
-/// What replays say of a case.
+/// Results of the replays of a case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Physics {
-    /// Whether the verdict's effects are the same physics as the truth; null where that was not asked: the names agree,
-    /// or one of both is no set of effects.
+    /// Whether the verdict's effects are the same physics as the truth.
+    ///
+    /// Null if the question does not arise: the names agree, or truth or verdict is no set of
+    /// effects.
     pub same_as_truth: Option<bool>,
-    /// Root mean square difference of their noise-free predictions, in units of the noise.
+    /// Root mean square difference of the noise-free predictions of both, in units of the noise.
     pub distance: Option<f64>,
-    /// Gaps; null where the truth cannot be fitted.
+    /// Gaps; null if the truth cannot be fitted.
     pub gaps: Option<Gaps>,
-    /// Why there are no replays, where there are none.
+    /// Reason why there are no replays.
     pub skipped: Option<String>,
 }
 
 impl Physics {
-    /// Of a case without replays, with the reason.
+    /// The result for a case without replays, with the reason.
     #[must_use]
     pub fn skipped(why: impl ToString) -> Self {
         Self {
@@ -62,10 +65,10 @@ impl Physics {
     }
 }
 
-/// What the machine of the study in a folder says of names.
+/// Meaning of names in the machine of the study in a folder.
 ///
 /// # Errors
-/// When the study cannot be read.
+/// If the study cannot be read.
 pub fn sites_of(folder: &Path) -> Result<Sites> {
     Ok(Sites::of(&Study::read(folder)?.plant))
 }

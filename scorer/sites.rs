@@ -1,4 +1,4 @@
-//! What names mean: which effects the catalogue has, and when two names are of the same effect at the same place.
+//! The meaning of names: when two names stand for the same effect at the same place.
 
 use std::collections::BTreeSet;
 
@@ -8,16 +8,16 @@ use asid_mjcf::Plant;
 
 use crate::label::{name_of, site_of};
 
-/// What the catalogue and a machine say of names.
+/// What the catalogue and a machine say about names.
 #[derive(Clone, Debug, Default)]
 pub struct Sites {
     /// Pairs of geoms that can touch.
     contacts: Vec<[String; 2]>,
-    /// Effects that change a contact and nothing else: their site may be either geom.
+    /// Effects that change a contact and nothing else; their site may be either geom.
     of_contacts: BTreeSet<String>,
 }
 
-/// Whether an effect at a site changes how the geom's contacts behave, and nothing else.
+/// Whether an effect at a site changes the contacts of the geom and nothing else.
 fn changes_contacts(effect: &dyn Effect, plant: &Plant, site: &str) -> bool {
     let targets = effect.targets(plant, site);
     let contact = |t: &asid_core::Target| {
@@ -27,7 +27,7 @@ fn changes_contacts(effect: &dyn Effect, plant: &Plant, site: &str) -> bool {
 }
 
 impl Sites {
-    /// Of a machine.
+    /// Meaning of names in a machine.
     #[must_use]
     pub fn of(plant: &Plant) -> Self {
         let geom = |i: usize| plant.layout.geoms[i].clone();
@@ -64,7 +64,7 @@ impl Sites {
             && self.contacts.iter().any(touch)
     }
 
-    /// Whether `set` has `effect`.
+    /// Whether `set` contains `effect`.
     #[must_use]
     pub fn holds(&self, set: &[String], effect: &str) -> bool {
         set.iter().any(|e| self.same(e, effect))

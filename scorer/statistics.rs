@@ -1,30 +1,33 @@
-//! Shares, means and medians with intervals, and how far stated probabilities are from what happens.
+//! Shares, means and medians with intervals, and the calibration of stated probabilities.
 
 use asid_core::rng::Streams;
 use asid_statistics::{bootstrap, mean, wilson};
 use rand::Rng as _;
 use serde::Serialize;
 
-/// Draws of what a calibrated answer would show: its 95 % quantile then rests on 50 of them.
+/// Simulated calibrated answers; 50 of them lie beyond the 95 % quantile.
 const DRAWS: usize = 1000;
-/// Seed of these draws: the same results give the same bytes.
+/// Seed of the simulation, so that the same results give the same bytes.
 const SEED: u64 = 0x5c0_7e57;
-/// Bins of a calibration curve, by width: ten, as in Guo et al. 2017, would hold a case or two each in a set of 75.
+/// Number of bins of a calibration curve, of equal width.
+///
+/// Ten, as in Guo et al. 2017, would hold only a case or two each in a set of 75.
 pub const BINS: usize = 5;
 
 /// A share of cases.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Share {
-    /// Cases for which it holds.
+    /// Number of cases for which it holds.
     pub count: usize,
-    /// Cases.
+    /// Number of cases.
     pub of: usize,
-    /// 95 % interval (Wilson 1927), which has a width even where none or all hold; null of no case.
+    /// 95 % interval (Wilson 1927), which has a width even if it holds for none or all; null
+    /// without a case.
     pub interval95: Option<[f64; 2]>,
 }
 
 impl Share {
-    /// How many of some cases hold.
+    /// Share of the cases for which it holds.
     #[must_use]
     pub fn of(holds: impl IntoIterator<Item = bool>) -> Self {
         let (mut count, mut of) = (0, 0);
@@ -39,7 +42,7 @@ impl Share {
         }
     }
 
-    /// The share; `None` of no case.
+    /// The share; `None` without a case.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         (self.of > 0).then(|| self.count as f64 / self.of as f64)
@@ -52,25 +55,25 @@ impl Share {
     }
 }
 
-/// A figure over cases with its interval.
+/// A mean or median over cases, with its interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Figure {
     /// Mean or median.
     pub value: f64,
     /// 95 % interval: percentiles of a bootstrap over cases (Efron 1979).
     pub interval95: [f64; 2],
-    /// Cases.
+    /// Number of cases.
     pub of: usize,
 }
 
 impl Figure {
-    /// Mean; `None` of no case.
+    /// Mean; `None` without a case.
     #[must_use]
     pub fn mean(values: &[f64]) -> Option<Self> {
         Self::new(values, mean)
     }
 
-    /// Median; `None` of no case.
+    /// Median; `None` without a case.
     #[must_use]
     pub fn median(values: &[f64]) -> Option<Self> {
         Self::new(values, |v| asid_statistics::median(v.iter().copied()))
@@ -85,7 +88,7 @@ impl Figure {
     }
 }
 
-/// Median; `None` of nothing.
+/// Median; `None` without a value.
 #[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| asid_statistics::median(values.iter().copied()))
@@ -96,26 +99,29 @@ pub fn median(values: &[f64]) -> Option<f64> {
 pub struct Bin {
     /// Mean stated probability.
     pub stated: f64,
-    /// Share that came true.
+    /// Share of cases in which the event happened.
     pub true_share: Share,
 }
 
-/// How far stated probabilities are from what happens.
+/// Calibration: how far stated probabilities are from the frequencies of their events.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Calibration {
-    /// Bins that hold a case, by stated probability.
+    /// Bins with at least one case, by stated probability.
     pub bins: Vec<Bin>,
-    /// Expected calibration error: mean distance of stated probability and true share, over bins weighted by cases.
+    /// Expected calibration error: mean distance of stated probability and true share, over bins
+    /// weighted by cases.
     pub error: f64,
-    /// What a perfectly calibrated answer with the same stated probabilities would show in the mean, by simulation: the
-    /// bias of the error at this number of cases.
+    /// Mean error of a perfectly calibrated answer with the same stated probabilities, by
+    /// simulation.
+    ///
+    /// It is the bias of the error at this number of cases.
     pub error_of_chance: f64,
-    /// What nineteen of twenty such answers would stay below.
+    /// Error below which 95 % of such calibrated answers stay.
     pub error_of_chance95: f64,
 }
 
 impl Calibration {
-    /// Of pairs of a stated probability and whether it came true.
+    /// Calibration from pairs of a stated probability and whether its event happened.
     #[must_use]
     pub fn of(stated: &[(f64, bool)]) -> Self {
         let mut random = Streams::new(SEED).stream("calibration");
@@ -190,10 +196,10 @@ mod tests {
             })
             .collect();
         let c = Calibration::of(&calibrated);
-        // A few cases show an error though nothing is wrong.
+        // A few cases show an error even if the answer is calibrated.
         assert!(c.error_of_chance > 0.03, "{c:?}");
         assert!(c.error < c.error_of_chance95, "{c:?}");
-        // Sure and wrong in every second case is an error of a half.
+        // An answer that is sure and wrong in every second case has an error of a half.
         let boasting: Vec<(f64, bool)> = (0..60).map(|i| (1.0, i % 2 == 0)).collect();
         let c = Calibration::of(&boasting);
         assert!((c.error - 0.5).abs() < 1e-12 && c.error_of_chance < 1e-12);

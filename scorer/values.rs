@@ -1,4 +1,4 @@
-//! Errors of fitted values, and whether their intervals hold the truth.
+//! Errors of fitted values, and whether their intervals contain the true values.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use crate::catalogue::parameters_of;
 use crate::label::{Label, name_of};
 use crate::sites::Sites;
 
-/// An estimate beside its true value.
+/// An estimate and its true value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Estimate {
     /// `NAME@SITE.parameter`, or a parameter of the study.
@@ -16,9 +16,12 @@ pub struct Estimate {
     pub truth: f64,
     /// Estimate.
     pub estimate: f64,
-    /// Distance of both, relative to the truth: of an effect to how far the truth is from where the effect is off.
+    /// Error relative to the true value.
+    ///
+    /// For an effect it is relative to the distance between the true value and the value at which
+    /// the effect is off.
     pub error: f64,
-    /// Whether the 95 % interval holds the truth; null where there is no interval.
+    /// Whether the 95 % interval contains the true value; null without an interval.
     pub covered: Option<bool>,
 }
 
@@ -38,8 +41,10 @@ fn estimate(
     }
 }
 
-/// Values of the causes that the verdict names. A value whose truth is the one at which the effect is off has no
-/// relative error, and a cause that is not named has no estimate.
+/// Values of the causes that the verdict names.
+///
+/// If the true value is the one at which the effect is off, there is no relative error. A cause
+/// that is not named has no estimate.
 #[must_use]
 pub fn of_effects(label: &Label, answer: &Answer, sites: &Sites) -> Vec<Estimate> {
     let mut found = Vec::new();
@@ -71,7 +76,7 @@ pub fn of_effects(label: &Label, answer: &Answer, sites: &Sites) -> Vec<Estimate
     found
 }
 
-/// The study's own parameters.
+/// Values of the study's own parameters.
 #[must_use]
 pub fn of_study(label: &Label, answer: &Answer) -> Vec<Estimate> {
     let known = answer.parameters.iter().filter_map(|p| {

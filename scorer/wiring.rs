@@ -1,26 +1,29 @@
-//! Faults of wiring: judged apart from the verdict, which is of the study after the mending.
+//! Scores wiring faults, separately from the verdict, which is about the study after the
+//! correction.
 //!
-//! A reading that is shifted by a constant has two descriptions, a wrong zero of its column and a bias of its sensor: the same
-//! physics. Where the label has the bias, an answer that mends the zero has named it.
+//! A reading with a constant shift has two descriptions: a wrong zero of its column, and a bias of
+//! its sensor. Both are the same physics. If the label has the bias, an answer that corrects the
+//! zero has named it.
 
 use serde::Serialize;
 
 use crate::answer::{Answer, WiringFound};
 use crate::label::{Label, WiringTruth, name_of, site_of};
 
-/// Faults of wiring of one case.
+/// Wiring faults of one case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Wiring {
-    /// Faults there are.
+    /// Number of true faults.
     pub faults: usize,
-    /// Of these, found: by name, at the same columns.
+    /// Number of true faults that were found: by name, at the same columns.
     pub found: usize,
-    /// Faults named that are not there.
+    /// Number of named faults that are absent.
     pub false_alarms: usize,
 }
 
-/// Whether both are the same fault at the same columns. A fault of all readings may name any of them, or none: a clock
-/// is late for all of them at once.
+/// Whether both are the same fault at the same columns.
+///
+/// A fault of all readings may name any of them or none: a clock is late for all of them at once.
 fn same(found: &WiringFound, truth: &WiringTruth) -> bool {
     let all = |a: &[String], b: &[String]| a.iter().all(|c| b.contains(c));
     let clock = truth.fault == "wiring-clock" && all(&found.columns, &truth.columns);
@@ -30,10 +33,10 @@ fn same(found: &WiringFound, truth: &WiringTruth) -> bool {
 
 /// The effect that is the same physics as [`SHIFT`] of a column of its sensor.
 const BIAS: &str = "sensor-bias";
-/// The fault that is a constant shift of a column.
+/// The fault of a constant shift of a column.
 const SHIFT: &str = "wiring-offset";
 
-/// Causes of a label that an answer has named by the zero of a column which it mends.
+/// Causes of a label that an answer has named by correcting the zero of a column.
 pub fn named_by_mending<'a>(label: &'a Label, answer: &Answer) -> impl Iterator<Item = &'a String> {
     let mended = |cause: &&String| {
         name_of(cause) == BIAS && answer.named_wiring().any(|f| is_bias_at(f, site_of(cause)))
@@ -46,7 +49,7 @@ pub fn named_by_mending<'a>(label: &'a Label, answer: &Answer) -> impl Iterator<
     causes.into_iter()
 }
 
-/// Whether a fault is the shift of a sensor.
+/// Whether a fault is a constant shift of a sensor's columns.
 fn is_bias_at(found: &WiringFound, sensor: &str) -> bool {
     let all = found
         .columns
@@ -55,7 +58,7 @@ fn is_bias_at(found: &WiringFound, sensor: &str) -> bool {
     found.fault == SHIFT && !found.columns.is_empty() && all
 }
 
-/// Sensor of a column: `NAME`, or `NAME.0` of an entry.
+/// Sensor of a column, which is called `NAME`, or `NAME.0` for an entry.
 fn sensor_of(column: &str) -> &str {
     match column.rsplit_once('.') {
         Some((sensor, entry)) if entry.parse::<usize>().is_ok() => sensor,
@@ -64,7 +67,7 @@ fn sensor_of(column: &str) -> &str {
 }
 
 impl Wiring {
-    /// Of a case; `answer` is missing where there was none.
+    /// Scores the wiring of a case; `answer` is missing if there is none.
     #[must_use]
     pub fn of(label: &Label, answer: Option<&Answer>) -> Self {
         let named: Vec<&WiringFound> = answer.into_iter().flat_map(Answer::named_wiring).collect();
@@ -127,7 +130,8 @@ mod tests {
         assert_eq!(Wiring::of(&label, None).found, 0);
     }
 
-    /// Symptom: a bias of a reading that was mended as a wrong zero counted as wrong, and as a false alarm of wiring.
+    /// Symptom: a bias that was corrected as a wrong zero counted as wrong, and as a false alarm of
+    /// wiring.
     #[test]
     fn a_column_whose_zero_is_mended_names_the_bias_of_its_sensor() {
         let shift = |column: &str| Answer {
@@ -148,7 +152,7 @@ mod tests {
         assert_eq!(named(&shift("angle")), 0);
         assert_eq!(Wiring::of(&label, Some(&shift("tip.2"))).false_alarms, 0);
         assert_eq!(Wiring::of(&label, Some(&shift("angle"))).false_alarms, 1);
-        // Where the wiring is wrong as well, the mending says nothing of the bias.
+        // If the wiring is wrong as well, correcting the column does not name the bias.
         let both = Label {
             wiring: vec![WiringTruth {
                 fault: SHIFT.into(),

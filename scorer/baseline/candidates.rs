@@ -1,4 +1,4 @@
-//! Every effect of the catalogue at every site, with the values from which a fit of it begins.
+//! Every effect of the catalogue at every site, with the start values of its fit.
 
 use asid_core::registry::all;
 use asid_effects::{Acts, Effect, EffectEntry, EffectSpec, Reference, Start};
@@ -6,10 +6,10 @@ use asid_mjcf::Plant;
 
 use crate::physics::Study;
 
-/// Starts of one candidate that are tried at most.
+/// Maximum number of start values that are tried for one candidate.
 const MOST_STARTS: usize = 6;
 
-/// What the logs, and the study's model along them, show of a machine.
+/// Motion of the machine: commands of the logs, and states of the study's model along them.
 pub struct Shown {
     /// Commands, `rows x nu`.
     pub ctrl: Vec<f64>,
@@ -53,7 +53,7 @@ impl Shown {
         }
     }
 
-    /// How far a joint travels between its ends, rad or m.
+    /// Range of a joint's positions along the logs, rad or m.
     fn travel(&self, plant: &Plant, joint: usize) -> f64 {
         let layout = &plant.layout;
         let places = || column(&self.qpos, layout.nq, layout.joints[joint].qpos);
@@ -62,7 +62,7 @@ impl Shown {
         (high - low).max(0.0)
     }
 
-    /// Largest force of the drives on a joint, N or N m.
+    /// Largest force of the drives on a joint along the logs, N or N m.
     fn force(&self, plant: &Plant, joint: usize) -> f64 {
         let layout = &plant.layout;
         let place = &layout.joints[joint];
@@ -79,7 +79,7 @@ impl Shown {
         largest(forces.filter(|f| f.is_finite()))
     }
 
-    /// Quantiles of where free bodies are along a world axis, m.
+    /// Quantiles of the position of the first free body along a world axis, m.
     fn places(&self, plant: &Plant, axis: usize, quantiles: &[f64]) -> Vec<f64> {
         let layout = &plant.layout;
         let free = |b: &usize| plant.free_joint(*b);
@@ -97,7 +97,7 @@ impl Shown {
     }
 }
 
-/// Deviation of a sensor's readings.
+/// Standard deviation of a sensor's readings.
 fn spread(study: &Study, sensor: &str) -> f64 {
     let values = study.train.iter().filter_map(|e| {
         let range = e.channel(sensor)?;
@@ -109,7 +109,7 @@ fn spread(study: &Study, sensor: &str) -> f64 {
     (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
-/// All candidates but those left out, each as the specifications that fits of it begin at.
+/// All candidates but those left out, each as the specifications at which its fits begin.
 #[must_use]
 pub fn candidates(study: &Study, shown: &Shown, without: &[String]) -> Vec<Vec<EffectSpec>> {
     let mut found = Vec::new();
@@ -139,7 +139,9 @@ pub fn candidates(study: &Study, shown: &Shown, without: &[String]) -> Vec<Vec<E
     found
 }
 
-/// Combinations of the parameters' start values; at null where the effect acts in proportion from there on.
+/// Combinations of the parameters' start values.
+///
+/// A parameter to which the effect is proportional starts at its null value.
 fn starts(
     effect: &dyn Effect,
     study: &Study,
@@ -174,7 +176,7 @@ fn starts(
             })
             .collect();
     }
-    // Evenly over the combinations.
+    // Select evenly among the combinations.
     let stride = all.len().div_ceil(MOST_STARTS);
     all.into_iter().step_by(stride).collect()
 }

@@ -1,4 +1,6 @@
-//! The noise of a sensor, where nobody says it: third differences of its readings, which a smooth motion leaves small.
+//! Estimates the noise of a sensor if nobody gives it.
+//!
+//! The estimate uses third differences of its readings, in which a smooth motion is small.
 
 use asid_core::Episode;
 use asid_core::signal::Signal;
@@ -6,14 +8,16 @@ use asid_core::signal::Signal;
 use crate::physics::Study;
 use crate::statistics::median;
 
-/// Ratio of a normal variable's deviation to the median of its size.
+/// Ratio of a normal variable's standard deviation to its median absolute value.
 const NORMAL: f64 = 1.482_602_218_505_602;
-/// Deviation of the third difference of white noise of deviation one, the root of 1 + 9 + 9 + 1.
+/// Standard deviation of the third difference of white noise of standard deviation one: the root of
+/// 1 + 9 + 9 + 1.
 const THIRD: f64 = 4.472_135_954_999_58;
-/// Noise that a sensor has at least, as a share of the spread of its readings: double precision and a log's digits.
+/// Smallest noise of a sensor, as a share of the spread of its readings: double precision and a
+/// log's digits.
 const LEAST: f64 = 1e-6;
 
-/// The sensors that a study's logs have, with the noise that it gives, or that their readings show.
+/// The sensors of a study's logs, each with its given or estimated noise.
 pub fn signals(study: &Study) -> Vec<Signal> {
     let sensors = study.plant.layout.sensors.iter();
     let logged = sensors.filter(|s| study.train.iter().any(|e| e.channel(&s.name).is_some()));

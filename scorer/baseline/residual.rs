@@ -1,8 +1,9 @@
-//! A network that learns what replays leave of the readings: how far one gets without saying what is missing.
+//! A network that learns the residuals of replays, without a name for what is missing.
 //!
-//! The study's parameters are fitted first. A small network then predicts the residual of a row from replayed readings and
-//! commands of this row and a few before. It never sees a reading as its input, so that its prediction is as open-loop as a
-//! replay. It names nothing; its answer holds what it says of the logs held out, which the scorer takes off there.
+//! The study's parameters are fitted first. A small network then predicts the residual of a row
+//! from the replayed readings and the commands of this row and a few earlier ones. It never gets a
+//! measured reading as input, so its prediction is as open-loop as a replay. Its answer holds its
+//! predictions for the held-out logs, which the scorer subtracts there.
 
 #[cfg(feature = "torch")]
 mod network;
@@ -14,26 +15,28 @@ use crate::answer::Answer;
 #[cfg(feature = "torch")]
 use crate::physics::logs::Logs;
 
-/// Rows that the network sees of, the present one included: at the usual 100 Hz 40 ms of the past, the delays and filters
-/// of drives.
+/// Rows that the network sees, the present one included.
+///
+/// At the usual 100 Hz they reach 40 ms back, as far as delays and filters of drives.
 #[cfg(feature = "torch")]
 const WINDOW: usize = 5;
 
-/// One log for the network.
+/// One log, as input of the network.
 #[cfg_attr(not(feature = "torch"), allow(dead_code))]
 pub struct Sequence {
-    /// What it sees, `rows x inputs`.
+    /// Inputs, `rows x width`.
     pub inputs: Vec<f64>,
-    /// Numbers of a row of these.
+    /// Number of inputs of a row.
     pub width: usize,
     /// Residuals in units of the noise, `rows x outputs`; NaN where a reading is missing.
     pub residuals: Vec<f64>,
 }
 
-/// What the network says of the logs held out, added to the answer of the study's fitted parameters.
+/// Adds the network's predictions for the held-out logs to the answer with the study's fitted
+/// parameters.
 ///
 /// # Errors
-/// Where a log cannot be replayed.
+/// If a log cannot be replayed.
 #[cfg(feature = "torch")]
 pub fn add(work: &mut Work<'_>, none: &Fitted, seed: u64, mut answer: Answer) -> Result<Answer> {
     let train = sequences(&work.replayed(none, work.training())?);
@@ -76,7 +79,7 @@ pub fn add(_work: &mut Work<'_>, _none: &Fitted, _seed: u64, _answer: Answer) ->
     ))
 }
 
-/// Logs with their replays, as the network sees them.
+/// Logs with their replays as inputs of the network.
 #[cfg(feature = "torch")]
 fn sequences((logs, predicted): &(Logs, Vec<Vec<f64>>)) -> Vec<Sequence> {
     let residuals = logs.residuals(predicted);
@@ -92,7 +95,8 @@ fn sequences((logs, predicted): &(Logs, Vec<Vec<f64>>)) -> Vec<Sequence> {
             let mut inputs = Vec::new();
             for row in 0..rows {
                 inputs.extend(at(row));
-                // Rows before as differences: as numbers they are nearly the same, and a delay is in what they differ by.
+                // Earlier rows enter as differences: the values themselves are nearly equal, and a
+                // delay shows in the differences.
                 for back in 1..WINDOW {
                     let before = at(row.saturating_sub(back));
                     inputs.extend(at(row).zip(before).map(|(now, then)| now - then));

@@ -1,4 +1,4 @@
-//! A study ready for fits: sets of effects are ranked by linearisations and fitted by replays.
+//! A study ready for fits: ranks sets of effects by linearisations and fits them by replays.
 
 #[cfg(feature = "torch")]
 use asid_core::Episode;
@@ -16,34 +16,35 @@ use crate::physics::logs::{Logs, within};
 use crate::physics::model::{Engine, Point, World};
 use crate::physics::start::{State, first_state, open_coordinates};
 
-/// Physics steps of a replay of all logs while candidates are ranked: some hundred of them take a minute on one core.
+/// Physics steps of a replay of all logs during ranking: some hundred replays take a minute on one
+/// core.
 const RANKING_STEPS: f64 = 4_000.0;
-/// The same while they are fitted.
+/// Physics steps of a replay of all logs during a fit.
 const FITTING_STEPS: f64 = 10_000.0;
 /// Leading candidates that are fitted in each round.
 const FITTED: usize = 4;
 
-/// A set of effects, fitted.
+/// A fitted set of effects.
 #[derive(Clone)]
 pub struct Fitted {
-    /// With their values.
+    /// Effects with their fitted values.
     pub effects: Vec<EffectSpec>,
-    /// All values, the study's parameters first.
+    /// All values; the study's parameters come first.
     pub point: Point,
-    /// Sum of squares in units of the noise.
+    /// Sum of squared residuals in units of the noise.
     pub squares: f64,
     readings: usize,
 }
 
 impl Fitted {
-    /// `NAME@SITE` of its effects, sorted.
+    /// `NAME@SITE` of the effects, sorted.
     pub fn labels(&self) -> Vec<String> {
         let mut labels: Vec<String> = self.effects.iter().map(EffectSpec::label).collect();
         labels.sort();
         labels
     }
 
-    /// Schwarz's criterion for white normal residuals of unknown deviation.
+    /// Bayesian information criterion for white normal residuals of unknown standard deviation.
     pub fn bic(&self) -> f64 {
         let n = self.readings as f64;
         n * (self.squares / n).ln() + self.point.values.len() as f64 * n.ln()
@@ -60,7 +61,7 @@ pub struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    /// Reads its logs.
+    /// Reads the logs of a study.
     pub fn new(study: &'a Study, engine: &'a Engine) -> Result<Self> {
         let (layout, signals) = (&study.plant.layout, noise::signals(study));
         let logs = |steps: f64| {
@@ -85,7 +86,7 @@ impl<'a> Work<'a> {
         &self.study.train
     }
 
-    /// The logs held out.
+    /// The held-out logs.
     #[cfg(feature = "torch")]
     pub fn testing(&self) -> &'a [Episode] {
         &self.study.test
@@ -97,8 +98,9 @@ impl<'a> Work<'a> {
         self.fitting.noise.clone()
     }
 
-    /// Episodes, as far as the scorer compares them, and their readings as a fitted set predicts them. Starts that they do
-    /// not give are fitted to their heads.
+    /// The compared part of some episodes, and their readings as a fitted set predicts them.
+    ///
+    /// Initial states that the logs do not give are fitted to the heads of the logs.
     #[cfg(feature = "torch")]
     pub fn replayed(&self, fitted: &Fitted, episodes: &[Episode]) -> Result<(Logs, Vec<Vec<f64>>)> {
         let layout = &self.study.plant.layout;
@@ -121,7 +123,8 @@ impl<'a> Work<'a> {
             .collect()
     }
 
-    /// The study's parameters in the middle of their ranges, the starts as the logs show them.
+    /// The study's parameters in the middle of their ranges, and initial states as the logs show
+    /// them.
     pub fn middle(&self) -> Point {
         Point {
             values: self
@@ -134,7 +137,8 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// The world of a set, and the values where its fit begins: the study's parameters as in `from`.
+    /// The world of a set and the start values of its fit; the study's parameters start as in
+    /// `from`.
     fn world(&self, effects: &[EffectSpec], from: &Point) -> Result<(World, Vec<f64>)> {
         let of = |name: &str| {
             let at = self.study.parameters.iter().position(|p| p.name == name)?;
@@ -145,7 +149,7 @@ impl<'a> Work<'a> {
         Ok((world, values))
     }
 
-    /// Fits a set from values of the study's parameters and starts.
+    /// Fits a set, starting from values of the study's parameters and initial states.
     pub fn fit(&mut self, effects: &[EffectSpec], from: &Point) -> Result<Fitted> {
         let (world, values) = self.world(effects, from)?;
         let mut fit = Fit::new(&self.study.plant.layout, &world, self.open.clone())?;
@@ -165,7 +169,7 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// Fits the sets that lead, of those with one effect more than `from`.
+    /// Adds one effect to `from`: ranks all candidates and fits the leading sets.
     pub fn round(&mut self, from: &Fitted, all: &[Vec<EffectSpec>]) -> Result<Vec<Fitted>> {
         let mut ranked: Vec<(f64, Vec<EffectSpec>)> = Vec::new();
         let layout = &self.study.plant.layout;
@@ -177,7 +181,7 @@ impl<'a> Work<'a> {
             let mut own: Option<(f64, Vec<EffectSpec>)> = None;
             for start in starts {
                 let effects = [&from.effects[..], std::slice::from_ref(start)].concat();
-                // What the engine cannot give the scene is no candidate.
+                // An effect that the engine cannot add to the scene is no candidate.
                 let Ok((world, values)) = self.world(&effects, &from.point) else {
                     continue;
                 };
@@ -200,7 +204,7 @@ impl<'a> Work<'a> {
             .collect()
     }
 
-    /// The set with one effect less by which the criterion falls most; `None` where it falls by none.
+    /// The set without one effect that lowers the criterion most; `None` if no removal lowers it.
     pub fn fewer(&mut self, from: &Fitted) -> Result<Option<Fitted>> {
         let mut best: Option<Fitted> = None;
         for left_out in 0..from.effects.len() {
@@ -215,7 +219,7 @@ impl<'a> Work<'a> {
         Ok(best)
     }
 
-    /// What the identified model does along the training logs.
+    /// Motion of the identified model along the training logs.
     pub fn shown(&mut self, none: &Fitted) -> Result<Shown> {
         let layout = &self.study.plant.layout;
         let (world, values) = self.world(&[], &none.point)?;

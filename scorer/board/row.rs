@@ -1,4 +1,4 @@
-//! One row of the scoreboard: some of the cases.
+//! One row of the scoreboard: a group of cases.
 
 use std::collections::BTreeMap;
 
@@ -9,28 +9,29 @@ use crate::case::Case;
 use crate::judge::Standing;
 use crate::statistics::{Figure, Share, median};
 
-/// Figures of some cases.
+/// Figures of a group of cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// What the cases have in common: `all`, `machine`, `world`, `cause`, `magnitude` or `fault`.
+    /// The property that the cases share: `all`, `machine`, `world`, `cause`, `magnitude` or
+    /// `fault`.
     pub by: &'static str,
-    /// Of that, which.
+    /// Value of that property.
     pub name: String,
-    /// How many.
+    /// Number of cases.
     pub cases: usize,
-    /// Verdict right; of the cases whose answer may name something, like the next two.
+    /// Right verdicts. This and the next two figures cover cases whose answer may name something.
     pub right: Share,
-    /// Right, or among the two most probable sets.
+    /// Right, or a right set among the two most probable.
     pub top2: Share,
-    /// Right, or in the ambiguity set.
+    /// Right, or a right set in the ambiguity set.
     pub covered: Share,
-    /// No answer at all.
+    /// Cases without an answer.
     pub unanswered: Share,
     /// Mean probability given to right sets.
     pub true_probability: Option<Figure>,
     /// Median size of the ambiguity sets, the verdict included.
     pub set_size: Option<f64>,
-    /// Median share closed of what the true effects close.
+    /// Median of the closed share of what the true effects close.
     pub closed: Option<Figure>,
     /// Median wall time, s.
     pub seconds: Option<f64>,
@@ -71,7 +72,7 @@ fn magnitude(gap: f64) -> String {
     }
 }
 
-/// Clean or dirty, and how far the cause stands out.
+/// Clean or dirty, and the multiple of the gap of the dirt that the cause reaches.
 fn world(c: &Case) -> String {
     match (c.dirty, c.kind) {
         (false, _) => "clean".into(),
@@ -80,7 +81,7 @@ fn world(c: &Case) -> String {
     }
 }
 
-/// All rows: everything, then machine by machine, then by what else tells cases apart.
+/// All rows: all cases, then by machine, world, cause, magnitude and fault.
 pub(super) fn rows(cases: &[&Case]) -> Vec<Row> {
     let mut rows = vec![Row::of("all", "all cases", cases)];
     type Keys<'a> = &'a dyn Fn(&Case) -> Vec<String>;

@@ -133,7 +133,7 @@ pub(super) fn probabilities(score: &Score) -> Section {
             ),
         ),
     ];
-    // A figure of nothing is left out.
+    // Leave out figures without a value.
     let facts = facts
         .into_iter()
         .filter(|(_, value)| value != "-" && !value.contains("- %"));

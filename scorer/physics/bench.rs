@@ -1,4 +1,4 @@
-//! A study on an engine: what sets of effects predict once they are fitted.
+//! A study on an engine: predictions of fitted sets of effects.
 
 mod equivalence;
 mod gaps;
@@ -21,14 +21,16 @@ use crate::label::Label;
 use equivalence::SAME;
 use named::{Named, truth, verdict};
 
-/// Sizes from which an effect without values is fitted, as shares of the way from where it is off to an end of a range.
+/// Start sizes of the fit of an effect without values.
+///
+/// They are shares of the distance from the value at which the effect is off to an end of a range.
 const SIZES: [f64; 3] = [1e-3, 1e-2, 1e-1];
 
 /// A study on an engine, with its logs.
 pub struct Bench<'a> {
     engine: Engine,
     study: &'a Study,
-    /// To fit to, and held out.
+    /// Training logs and held-out logs.
     logs: [Logs; 2],
 }
 
@@ -36,7 +38,7 @@ impl<'a> Bench<'a> {
     /// Compiles the study's model and reads its logs.
     ///
     /// # Errors
-    /// When the engine refuses the model, or the logs cannot be replayed.
+    /// If the engine refuses the model, or if the logs cannot be replayed.
     pub fn new(
         backend: Arc<dyn Backend>,
         study: &'a Study,
@@ -50,10 +52,10 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// What replays say of an answer.
+    /// Judges an answer by replays.
     ///
     /// # Errors
-    /// When a set of effects cannot be put into the model, or the cause is in no catalogue.
+    /// If a set of effects cannot be put into the model, or if the cause is in no catalogue.
     pub fn examine(&mut self, judge: &Judge<'_>, answer: &Answer) -> Result<Physics> {
         let label = judge.label;
         if label.is_unknown() {
@@ -71,7 +73,8 @@ impl<'a> Bench<'a> {
             let said = verdict(answer);
             let targets = self.predictions(&true_world, &best)?;
             let distance = self.distance(&said, &targets)?;
-            // A set that holds more than it takes can always imitate the truth: each of its effects must be needed.
+            // A set with superfluous effects can always imitate the truth, so each of its effects
+            // must be needed.
             let same = distance < SAME && self.each_is_needed(&said, &targets)?;
             physics.distance = Some(distance);
             physics.same_as_truth = Some(same);
@@ -79,7 +82,7 @@ impl<'a> Bench<'a> {
         Ok(physics)
     }
 
-    /// First states of some logs, and the coordinates that some log leaves open.
+    /// Initial states of some logs, and the coordinates that some log does not give.
     fn starts(&self, which: usize) -> (Vec<State>, Vec<usize>) {
         let episodes = || self.logs[which].logs.iter().map(|l| &l.episode);
         let first = |e| first_state(&self.study.plant, e);
@@ -87,7 +90,7 @@ impl<'a> Bench<'a> {
         (episodes().map(first).collect(), open)
     }
 
-    /// A set fitted to the training logs: its world, and its values.
+    /// A set fitted to the training logs: its world and its values.
     fn fitted(&mut self, named: &Named<'_>) -> Result<(World, Vec<f64>)> {
         let world = self
             .engine
@@ -103,8 +106,10 @@ impl<'a> Bench<'a> {
         Ok((world, point.values))
     }
 
-    /// Where the fit of an effect begins whose values nobody gives: at the size, of some over three decades of its
-    /// parameters' ranges, that leaves the least, or where it is off.
+    /// Start point of the fit of an effect whose values nobody gives.
+    ///
+    /// It is the size with the smallest residuals, among sizes over three decades of the
+    /// parameters' ranges and the off value.
     fn first_size(
         &mut self,
         fit: &mut Fit<'_>,
@@ -134,7 +139,8 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Root mean square of the residuals that count; infinite where one of them is missing: that simulation diverged.
+/// Root mean square of the residuals that count; infinite if one is missing because its simulation
+/// diverged.
 fn gap(residuals: &[Vec<f64>], counts: &[bool]) -> f64 {
     let all = residuals.iter().flatten().zip(counts);
     let (mut sum, mut n) = (0.0, 0_usize);

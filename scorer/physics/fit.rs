@@ -1,8 +1,9 @@
-//! Output-error fits: unknowns and open starts by nonlinear least squares over replays.
+//! Output-error fits: unknowns and open initial states by nonlinear least squares over replays.
 //!
-//! Levenberg and Marquardt's method (Marquardt 1963) with Marquardt's scaling, derivatives by forward differences, and
-//! Huber's weights (Huber 1964), so that a reading that is far off does not decide. A start is shared by nothing: its
-//! columns stand in the rows of its own log, and all logs' starts are shifted in one replay.
+//! The method is Levenberg-Marquardt (Marquardt 1963) with Marquardt's scaling and forward
+//! differences. Huber's weights (Huber 1964) keep outliers from deciding. Each log has its own
+//! initial state: its Jacobian columns are nonzero only in the rows of its log. One replay
+//! therefore shifts the initial states of all logs at once.
 
 use asid_core::Layout;
 use asid_core::Result;
@@ -11,24 +12,28 @@ use nalgebra::{DMatrix, DVector};
 use super::logs::Logs;
 use super::model::{Point, Replays, World};
 
-/// Most linearisations of a fit: from the values of a label it takes three to six, from where an effect is off some more.
+/// Maximum number of linearisations of a fit: from a label's values it takes three to six, from the
+/// off values of an effect some more.
 const MOST_ROUNDS: usize = 20;
-/// Relative decrease of the cost below which a fit has ended.
+/// Relative decrease of the cost below which a fit has converged.
 const ENDED: f64 = 1e-4;
-/// Residual, in robust deviations, from which on a reading counts by its size and not its square: Huber's 1.345 costs
-/// 5 % of efficiency, and is made for more frequent outliers than a log's.
+/// Residual, in robust standard deviations, above which a reading counts linearly and not squared.
+///
+/// Huber's 1.345 costs 5 % of efficiency and is meant for more outliers than a log has.
 const HUBER: f64 = 3.0;
-/// Step of finite differences of a start: m or rad.
+/// Finite-difference step of an initial position: m or rad.
 const POSITION_STEP: f64 = 1e-5;
-/// The same for a speed: m/s or rad/s.
+/// Finite-difference step of an initial velocity: m/s or rad/s.
 const SPEED_STEP: f64 = 1e-4;
 /// Points that are replayed at once.
 const CAPACITY: usize = 8;
-/// Damping at which a step is given up: it is then a ten-thousandth of Gauss and Newton's.
+/// Damping at which a step is given up: the step is then a ten-thousandth of the Gauss-Newton step.
 const STUCK: f64 = 1e4;
-/// Factors of the steps of finite differences, one after the other. Where a simulated impact falls within its time step
-/// changes the speed after it a little, so that predictions are rough in every unknown; small steps then show the
-/// roughness, and larger ones the slope.
+/// Factors of the finite-difference steps, used one after the other.
+///
+/// The time at which a simulated impact falls within its time step changes the speed after it a
+/// little. Predictions are therefore rough in every unknown. Small steps then show the roughness,
+/// and larger ones the slope.
 const STRETCHES: [f64; 3] = [1.0, 30.0, 600.0];
 
 /// A fit.
@@ -37,22 +42,22 @@ pub struct Fit<'a> {
     replays: Replays,
     ranges: Vec<[f64; 2]>,
     steps: Vec<f64>,
-    /// Which unknowns are fitted.
+    /// Indices of the unknowns that are fitted.
     free: Vec<usize>,
-    /// Coordinates of the starts that are fitted.
+    /// Coordinates of the initial states that are fitted.
     open: Vec<usize>,
-    /// Factor of the steps of finite differences.
+    /// Factor of the finite-difference steps.
     stretch: f64,
 }
 
-/// Residuals by log, NaN where missing.
+/// Residuals of each log; NaN for a missing reading.
 type Residuals = Vec<Vec<f64>>;
 
 impl<'a> Fit<'a> {
-    /// Fits all unknowns of a world, and the starts' `open` coordinates.
+    /// Fits all unknowns of a world and the `open` coordinates of the initial states.
     ///
     /// # Errors
-    /// When the engine cannot set an unknown.
+    /// If the engine cannot set an unknown.
     pub fn new(layout: &'a Layout, world: &World, open: Vec<usize>) -> Result<Self> {
         Ok(Self {
             layout,
@@ -65,23 +70,23 @@ impl<'a> Fit<'a> {
         })
     }
 
-    /// Fits the starts alone.
+    /// Restricts the fit to the initial states.
     #[must_use]
     pub fn starts_only(mut self) -> Self {
         self.free.clear();
         self
     }
 
-    /// Predicted readings at a point, by log.
+    /// Predicted readings at a point, one array per log.
     ///
     /// # Errors
-    /// When a value is not physical or the engine fails.
+    /// If a value is not physical or the engine fails.
     pub fn predict(&mut self, logs: &mut Logs, point: &Point) -> Result<Vec<Vec<f64>>> {
         let points = std::slice::from_ref(point);
         Ok(self.replays.readings(logs, points)?.swap_remove(0))
     }
 
-    /// Residuals at some points; `None` where a simulation diverged.
+    /// Residuals at each of the points; `None` if a simulation diverges.
     fn residuals(&mut self, logs: &mut Logs, points: &[Point]) -> Result<Vec<Option<Residuals>>> {
         let readings = self.replays.readings(logs, points)?;
         let whole = |logs: &[Vec<f64>]| logs.iter().flatten().all(|x| x.is_finite());
@@ -89,10 +94,10 @@ impl<'a> Fit<'a> {
         Ok(readings.iter().map(residual).collect())
     }
 
-    /// The point at the least cost near `start`; `start` itself where its simulation diverges.
+    /// The point of least cost near `start`; `start` itself if its simulation diverges.
     ///
     /// # Errors
-    /// When a value is not physical or the engine fails.
+    /// If a value is not physical or the engine fails.
     pub fn run(&mut self, logs: &mut Logs, start: Point) -> Result<Point> {
         let mut here = start;
         if self.free.is_empty() && self.open.is_empty() {
@@ -106,7 +111,7 @@ impl<'a> Fit<'a> {
         Ok(here)
     }
 
-    /// Descends with one size of finite differences.
+    /// Runs Levenberg-Marquardt with one size of finite differences.
     fn descend(&mut self, logs: &mut Logs, start: Point) -> Result<Point> {
         let mut here = start;
         let mut damping = 1e-3;
@@ -139,11 +144,13 @@ impl<'a> Fit<'a> {
         Ok(here)
     }
 
-    /// The sum of squares at a point, and the one that a step within the ranges should lead to by the point's linearisation;
-    /// `None` where the simulation diverges.
+    /// The sum of squares at a point, and the one that its linearisation predicts for a step within
+    /// the ranges.
+    ///
+    /// `None` if the simulation diverges.
     ///
     /// # Errors
-    /// When a value is not physical or the engine fails.
+    /// If a value is not physical or the engine fails.
     pub fn promise(&mut self, logs: &mut Logs, here: &Point) -> Result<Option<[f64; 2]>> {
         let mut points = vec![here.clone()];
         points.extend(self.neighbours(here));
@@ -151,7 +158,7 @@ impl<'a> Fit<'a> {
         let Some(at) = all[0].take() else {
             return Ok(None);
         };
-        // Plain squares, so that promises from different points can be compared.
+        // Without Huber's weights, so that predictions from different points can be compared.
         let scale = f64::INFINITY;
         let (normal, gradient) = self.normal_equations(here, &at, &all[1..], scale);
         let mut step = damped_step(&normal, &gradient, 1e-6);
@@ -164,10 +171,10 @@ impl<'a> Fit<'a> {
         Ok(Some([before, after.clamp(0.0, before)]))
     }
 
-    /// Sum of squares at a point, and the number of readings; infinite where the simulation diverges.
+    /// Sum of squares at a point, infinite if the simulation diverges, and the number of readings.
     ///
     /// # Errors
-    /// When a value is not physical or the engine fails.
+    /// If a value is not physical or the engine fails.
     pub fn squares(&mut self, logs: &mut Logs, here: &Point) -> Result<(f64, usize)> {
         let mut all = self.residuals(logs, std::slice::from_ref(here))?;
         let Some(at) = all[0].take() else {
@@ -177,7 +184,8 @@ impl<'a> Fit<'a> {
         Ok((present().map(|r| r * r).sum(), present().count()))
     }
 
-    /// Step of an unknown from a value: away from a bound that is near, and no longer than half of the range.
+    /// Finite-difference step of an unknown: away from a near upper bound, and at most half of the
+    /// range.
     fn step(&self, unknown: usize, value: f64) -> f64 {
         let [low, high] = self.ranges[unknown];
         let step = (self.stretch * self.steps[unknown]).min(0.5 * (high - low));
@@ -192,7 +200,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// A point for each column: an unknown moved, then a coordinate of all starts.
+    /// One point per replay: each moved unknown, then each coordinate moved in all initial states.
     fn neighbours(&self, here: &Point) -> Vec<Point> {
         let unknowns = self.free.iter().map(|&u| {
             let mut point = here.clone();
@@ -211,7 +219,8 @@ impl<'a> Fit<'a> {
         unknowns.chain(starts).collect()
     }
 
-    /// Columns in the order of the normal equations: the unknowns, then log by log the starts' coordinates.
+    /// Normal equations. The columns are the unknowns, then log by log the coordinates of the
+    /// initial states.
     fn normal_equations(
         &self,
         here: &Point,
@@ -233,7 +242,7 @@ impl<'a> Fit<'a> {
             for (i, &r) in residuals.iter().enumerate().filter(|(_, r)| r.is_finite()) {
                 let weight = (HUBER * scale / r.abs()).min(1.0);
                 for ((x, moved), step) in row.iter_mut().zip(moved).zip(&steps) {
-                    // Residuals fall where predictions grow.
+                    // The residual falls as the prediction grows.
                     *x = moved.as_ref().map_or(0.0, |r1| (r - r1[l][i]) / step);
                 }
                 for a in (0..k + m).filter(|&a| row[a] != 0.0) {
@@ -264,10 +273,10 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// Median of the residuals' sizes as a deviation of normal noise.
+/// Robust standard deviation of the residuals, from their median absolute value.
 #[must_use]
 pub fn robust_deviation(residuals: &[Vec<f64>]) -> f64 {
-    /// Ratio of a normal variable's deviation to the median of its size.
+    /// Ratio of a normal variable's standard deviation to its median absolute value.
     const NORMAL: f64 = 1.482_602_218_505_602;
     let sizes = residuals.iter().flatten().filter(|r| r.is_finite());
     let sizes: Vec<f64> = sizes.map(|r| r.abs()).collect();
@@ -292,7 +301,7 @@ fn damped_step(normal: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> 
     let mut damped = normal.clone();
     let largest = normal.diagonal().max().max(f64::MIN_POSITIVE);
     for i in 0..damped.nrows() {
-        // What the logs do not see does not move.
+        // A direction that the logs do not determine does not move.
         damped[(i, i)] += damping * normal[(i, i)] + 1e-12 * largest;
     }
     match damped.cholesky() {

@@ -1,5 +1,5 @@
-//! Logs made ready for replays: mended where the label says that their wiring is wrong, of a bounded length, with the
-//! noise that their readings are divided by.
+//! Logs prepared for replays: corrected if the label states a wiring fault, of bounded length, and
+//! with the noise of their readings.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,17 @@ use super::study::Study;
 use crate::answer::Answer;
 use crate::label::{Label, WiringTruth};
 
-/// Physics steps of all logs of a kind together: what a fit of some twenty replays does in seconds on one core.
+/// Physics steps of all logs of a kind together; a fit of about twenty replays then takes seconds
+/// on one core.
 pub const MOST_STEPS: f64 = 24_000.0;
-/// Share of a log on which a start that it does not give is fitted, and which then does not count.
+/// Share of a log to which a missing initial state is fitted; this part is then not scored.
 pub const HEAD: f64 = 0.1;
-/// Rows that a log keeps at least, where it has as many.
+/// Smallest number of rows that a log keeps, if it has as many.
 const FEWEST_ROWS: usize = 12;
 
 /// One log.
 pub struct Log {
-    /// The log.
+    /// Its episode.
     pub episode: Episode,
     /// How it is replayed.
     pub replay: Replay,
@@ -29,19 +30,19 @@ pub struct Log {
     pub readings: Vec<f64>,
 }
 
-/// Some logs of one machine.
+/// Logs of one machine.
 pub struct Logs {
     /// The logs.
     pub logs: Vec<Log>,
-    /// Names of the sensors compared.
+    /// Names of the compared sensors.
     pub sensors: Vec<String>,
-    /// Noise of each entry of a residual, three of an orientation, in the sensor's unit.
+    /// Noise of each entry of a residual, in the sensor's unit; an orientation has three entries.
     pub noise: Vec<f64>,
     /// Differences of readings in units of the noise.
     pub signals: SignalSet,
 }
 
-/// Noise of the sensors that the logs have: as the label says, else as the study, else as the diagnosis took it to be.
+/// Noise of the sensors in the logs: from the label, else from the study, else from the answer.
 fn noise(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<Vec<Signal>> {
     let said: BTreeMap<&str, f64> = answer
         .into_iter()
@@ -71,7 +72,7 @@ fn noise(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<Vec<Si
         .collect()
 }
 
-/// Undoes a fault of wiring in a log.
+/// Corrects a wiring fault in a log.
 fn mend(episode: &mut Episode, fault: &WiringTruth) -> Result<()> {
     let at: Option<Vec<usize>> = fault
         .columns
@@ -88,13 +89,13 @@ fn mend(episode: &mut Episode, fault: &WiringTruth) -> Result<()> {
         ("wiring-sign" | "wiring-unit", &[a]) if fault.value != 0.0 => {
             rows.for_each(|r| r[a] /= fault.value);
         }
-        // Readings at other times than their commands need another replay.
+        // Readings at other times than their commands would need another replay.
         _ => return Err(wrong()),
     }
     Ok(())
 }
 
-/// The first rows of each log, such that a replay of all takes no more than some physics steps.
+/// The first rows of each log, so that a replay of all takes at most `steps` physics steps.
 #[must_use]
 pub fn within(episodes: &[Episode], timestep: f64, steps: f64) -> Vec<Episode> {
     let length = |e: &Episode| (e.time[e.rows() - 1] - e.time[0]) / timestep;
@@ -107,10 +108,10 @@ pub fn within(episodes: &[Episode], timestep: f64, steps: f64) -> Vec<Episode> {
 }
 
 impl Logs {
-    /// The study's logs to fit to, and those held out.
+    /// The study's training logs and held-out logs.
     ///
     /// # Errors
-    /// When the noise of a sensor is not known, or the logs cannot be mended.
+    /// If the noise of a sensor is not known, or if the logs cannot be corrected.
     pub fn of(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<[Self; 2]> {
         let signals = noise(study, label, answer)?;
         let make = |episodes: &[Episode]| -> Result<Self> {
@@ -126,7 +127,7 @@ impl Logs {
     /// Some episodes, compared by some signals.
     ///
     /// # Errors
-    /// When the scene has no such sensor.
+    /// If the scene lacks a sensor.
     pub fn new(layout: &Layout, signals: &[Signal], episodes: Vec<Episode>) -> Result<Self> {
         let sensors: Vec<String> = signals.iter().map(|s| s.sensor.clone()).collect();
         let logs = episodes.into_iter().map(|episode| {
@@ -144,7 +145,7 @@ impl Logs {
         })
     }
 
-    /// The first rows of each log: what a start that no log gives is fitted to.
+    /// The first rows of each log, to which a missing initial state is fitted.
     ///
     /// # Errors
     /// As [`Logs::of`].
@@ -152,7 +153,7 @@ impl Logs {
         self.cut(layout, |rows| head_rows(rows, share))
     }
 
-    /// The same logs again.
+    /// A copy of these logs.
     ///
     /// # Errors
     /// As [`Logs::of`].
@@ -177,7 +178,7 @@ impl Logs {
         })
     }
 
-    /// The same logs with other readings, one array a log; what is missing stays missing.
+    /// The same logs with other readings, one array per log; missing readings stay missing.
     #[must_use]
     pub fn with_readings(mut self, readings: &[Vec<f64>]) -> Self {
         for (log, new) in self.logs.iter_mut().zip(readings) {
@@ -190,8 +191,9 @@ impl Logs {
         self
     }
 
-    /// Differences of the readings and predicted ones (`rows x width`, one array a log) in units of the noise, one
-    /// after the other; NaN where a reading is missing or a simulation diverged.
+    /// Residuals of predicted readings (`rows x width`, one array per log), in units of the noise.
+    ///
+    /// They are NaN if a reading is missing or a simulation diverged.
     #[must_use]
     pub fn residuals(&self, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let (width, n) = (self.signals.width(), self.signals.whitened_len());
@@ -224,7 +226,7 @@ fn noise_by_entry(layout: &Layout, signals: &[Signal]) -> Result<Vec<f64>> {
     Ok(all)
 }
 
-/// Rows of the head of a log with so many rows.
+/// Number of rows in the head of a log with `rows` rows.
 #[must_use]
 pub fn head_rows(rows: usize, share: f64) -> usize {
     let share = (share * rows as f64).ceil() as usize;

@@ -20,22 +20,24 @@ pub struct Engine {
     plant: Arc<Plant>,
 }
 
-/// An unknown of a fit: targets that share a value.
+/// An unknown of a fit: one value shared by some targets.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     parameter: Parameter,
-    /// Where the fit begins, in the parameter's unit.
+    /// Start value of the fit, in the parameter's unit.
     pub start: f64,
     /// Smallest and largest value.
     pub range: [f64; 2],
-    /// A small step, in the parameter's unit.
+    /// Finite-difference step, in the parameter's unit.
     pub step: f64,
 }
 
-/// Step of finite differences, relative to the value: the square root of single precision, which any engine's rollouts
-/// resolve, and far below what changes a slope.
+/// Finite-difference step relative to the value: the square root of single precision.
+///
+/// The rollouts of any engine resolve it, and it is far below what changes a slope.
 const STEP: f64 = 3e-4;
-/// The same for a value that begins at zero, in units of its range, where that is no more than one unit.
+/// Finite-difference step of a value that starts at zero, in units of its range, or of 1 if the
+/// range is larger.
 const STEP_AT_ZERO: f64 = 1e-5;
 
 impl Unknown {
@@ -59,7 +61,7 @@ impl Unknown {
         targets.any(|t| t.element == "effect" && t.name == effect)
     }
 
-    /// Writes a value into the effect that this is an unknown of.
+    /// Writes a value into the effect to which this unknown belongs.
     pub fn set(&self, effects: &mut [EffectSpec], value: f64) {
         for target in &self.parameter.targets {
             let own = effects.iter_mut().find(|e| e.label() == target.name);
@@ -74,7 +76,7 @@ impl Unknown {
 /// A model with effects whose values are unknowns.
 pub struct World {
     model: Arc<dyn Model>,
-    /// The study's parameters, then those of the effects.
+    /// The study's parameters, followed by those of the effects.
     pub unknowns: Vec<Unknown>,
 }
 
@@ -82,7 +84,7 @@ impl Engine {
     /// Compiles the study's scene.
     ///
     /// # Errors
-    /// When the engine refuses it.
+    /// If the engine refuses it.
     pub fn new(backend: Arc<dyn Backend>, study: &Study) -> Result<Self> {
         Ok(Self {
             model: backend.load(&study.model.scene)?,
@@ -91,11 +93,12 @@ impl Engine {
         })
     }
 
-    /// The study's model with more effects, whose values given are where a fit begins; `known` gives starts of the
-    /// study's parameters.
+    /// The study's model with more effects; their given values are the start of a fit.
+    ///
+    /// `known` gives start values of the study's parameters.
     ///
     /// # Errors
-    /// When an effect, its site or a value is unknown, or the engine cannot give it.
+    /// If an effect, its site or a value is unknown, or if the engine cannot provide it.
     pub fn world(
         &self,
         study: &Study,
@@ -123,7 +126,7 @@ impl Engine {
             let effect = spec.find(&self.plant)?;
             let values = spec.values_of(&*effect)?;
             for (p, value) in effect.parameters().iter().zip(values) {
-                // What no search looks for stays as it is given.
+                // A parameter that no search varies keeps its given value.
                 if matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..)) {
                     continue;
                 }
@@ -142,12 +145,12 @@ impl Engine {
     }
 }
 
-/// Values of the unknowns, and where each log begins.
+/// Values of the unknowns and initial states of the logs.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// One value an unknown.
+    /// One value per unknown.
     pub values: Vec<f64>,
-    /// One start a log.
+    /// One initial state per log.
     pub starts: Vec<State>,
 }
 
@@ -159,10 +162,10 @@ pub struct Replays {
 }
 
 impl Replays {
-    /// Takes up to `capacity` points at once.
+    /// Prepares replays of up to `capacity` points at once.
     ///
     /// # Errors
-    /// When the engine cannot set an unknown.
+    /// If the engine cannot set an unknown.
     pub fn new(world: &World, capacity: usize) -> Result<Self> {
         let parameters: Vec<Parameter> =
             world.unknowns.iter().map(|u| u.parameter.clone()).collect();
@@ -177,10 +180,11 @@ impl Replays {
         })
     }
 
-    /// Predicted readings: for each point, for each log `rows x width`; NaN from where a simulation diverged.
+    /// Predicted readings: for each point, for each log `rows x width`; NaN after a simulation has
+    /// diverged.
     ///
     /// # Errors
-    /// When a value is not physical or the engine fails.
+    /// If a value is not physical or the engine fails.
     pub fn readings(&mut self, logs: &mut Logs, points: &[Point]) -> Result<Vec<Vec<Vec<f64>>>> {
         let mut all: Vec<Vec<Vec<f64>>> = vec![Vec::new(); points.len()];
         for (chunk, out) in points

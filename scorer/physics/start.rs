@@ -1,4 +1,5 @@
-//! Where an episode begins: as its log says, as its first readings show, and which coordinates neither tells.
+//! The initial state of an episode, from its log or its first readings, and the coordinates that
+//! neither gives.
 
 use asid_core::layout::JointKind;
 use asid_core::problem::home;
@@ -8,21 +9,22 @@ use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Rows that a first speed is taken over.
+/// Rows over which an initial velocity is computed.
 const FIRST_ROWS: usize = 6;
 
 /// Positions and velocities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// `nq`.
+    /// Positions, `nq` values.
     pub qpos: Vec<f64>,
-    /// `nv`.
+    /// Velocities, `nv` values.
     pub qvel: Vec<f64>,
 }
 
 impl State {
-    /// Moves it along a coordinate: of the `nv` positions, then of the `nv` velocities. Orientations turn about the
-    /// body's own axes.
+    /// Shifts the state along one coordinate: first the `nv` positions, then the `nv` velocities.
+    ///
+    /// Orientations rotate about the body's own axes.
     pub fn shift(&mut self, layout: &Layout, coordinate: usize, by: f64) {
         if coordinate >= layout.nv {
             self.qvel[coordinate - layout.nv] += by;
@@ -52,7 +54,7 @@ impl State {
     }
 }
 
-/// First whole reading of a sensor, one a few rows later, and the time between.
+/// First complete reading of a sensor, one a few rows later, and the time between them.
 fn first_readings(episode: &Episode, sensor: &str) -> Option<([Vec<f64>; 2], f64)> {
     let range = episode.channel(sensor)?;
     let reading = |k: usize| &episode.reading(k)[range.clone()];
@@ -64,13 +66,14 @@ fn first_readings(episode: &Episode, sensor: &str) -> Option<([Vec<f64>; 2], f64
     Some(([reading(first).to_vec(), reading(later).to_vec()], span))
 }
 
-/// The start of an episode: the scene's own, what sensors show of it, what the log gives.
+/// Initial state of an episode: the scene's own, overwritten by what sensors show, then by what the
+/// log gives.
 #[must_use]
 pub fn first_state(plant: &Plant, episode: &Episode) -> State {
     let layout = &plant.layout;
     let (qpos, qvel) = home(layout);
     let mut state = State { qpos, qvel };
-    // Measured speeds come after those that are differences of positions.
+    // Measured velocities come last; they overwrite differences of positions.
     let mut sensors: Vec<usize> = (0..layout.sensors.len()).collect();
     sensors.sort_by_key(|&i| layout.sensors[i].kind == "jointvel");
     for i in sensors {
@@ -118,7 +121,8 @@ pub fn first_state(plant: &Plant, episode: &Episode) -> State {
     state
 }
 
-/// Coordinates of the starts (`nv` positions, then `nv` velocities) that some log leaves open.
+/// Coordinates of the initial states (`nv` positions, then `nv` velocities) that some log does not
+/// give.
 #[must_use]
 pub fn open_coordinates<'a>(
     layout: &Layout,
@@ -134,7 +138,8 @@ pub fn open_coordinates<'a>(
             let places = &given.qpos[joint.qpos..joint.qpos + joint.kind.qpos_len()];
             let scalar = places.len() == joint.kind.qvel_len();
             for local in 0..joint.kind.qvel_len() {
-                // A position that is missing leaves its coordinate open; a part of a quaternion all three turns.
+                // A missing position leaves its coordinate open; a missing quaternion component
+                // leaves all three rotations open.
                 let missing = match (scalar, joint.kind) {
                     (true, _) => !places[local].is_finite(),
                     (false, JointKind::Free) if local < 3 => !places[local].is_finite(),

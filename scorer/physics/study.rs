@@ -1,4 +1,4 @@
-//! A study as the scorer's replays need it: the model, what its owner fits, the logs.
+//! A study for the scorer's replays: the model, the owner's parameters and the logs.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ struct Document {
     parameter: Vec<StudyParameter>,
     #[serde(default)]
     noise: BTreeMap<String, f64>,
-    /// Names of other stacks; such logs are not read here.
+    /// Column mappings of other stacks; such logs are not read here.
     #[serde(default)]
     column: Vec<toml::Value>,
 }
@@ -44,17 +44,17 @@ struct StudyParameter {
 
 /// A study.
 pub struct Study {
-    /// Its model, with what a refined model sets and adds.
+    /// Its model, with everything that a refined model sets and adds.
     pub model: RefinedModel,
     /// The machine.
     pub plant: Plant,
-    /// What its owner fits already.
+    /// Parameters that the owner fits.
     pub parameters: Vec<Parameter>,
-    /// Logs to fit to.
+    /// Training logs.
     pub train: Vec<Episode>,
-    /// Logs held out.
+    /// Held-out logs.
     pub test: Vec<Episode>,
-    /// Deviation of each sensor's noise, where it is given.
+    /// Standard deviation of each sensor's noise, if it is given.
     pub noise: BTreeMap<String, f64>,
 }
 
@@ -62,7 +62,7 @@ impl Study {
     /// The model of the study in a folder.
     ///
     /// # Errors
-    /// When a file is missing or wrong.
+    /// If a file is missing or wrong.
     pub fn model_of(folder: &Path) -> Result<RefinedModel> {
         RefinedModel::open(&folder.join(document(folder)?.model))
     }
@@ -70,7 +70,7 @@ impl Study {
     /// Reads the study in a folder.
     ///
     /// # Errors
-    /// When a file is missing or wrong, or its logs need a mapping of names.
+    /// If a file is missing or wrong, or if its logs need a mapping of names.
     pub fn read(folder: &Path) -> Result<Self> {
         let document = document(folder)?;
         let fail = |message: String| Error::File {
@@ -130,7 +130,7 @@ fn document(folder: &Path) -> Result<Document> {
     asid_documents::toml_text::read(&text).map_err(|e| fail(e.message().replace('\n', " ")))
 }
 
-/// Files of a folder whose name matches a pattern with at most one `*` in its last part, sorted.
+/// Files of a folder that match a pattern, sorted. The last part of the pattern may have one `*`.
 fn matching(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     let path = folder.join(pattern);
     let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 
 use manifests::{assert_unused, dependencies, manifests};
 
-/// Crates that answer cases, or make them: the scorer may know none of them.
+/// Crates that answer or make cases; the scorer must not depend on them.
 const STRANGERS: [&str; 3] = ["asid-diagnosis", "asid-withheld", "asid-algorithms"];
 
 #[test]
 fn the_scorer_knows_neither_the_diagnosis_nor_the_generator() {
-    // What its dependencies depend on counts as well.
+    // Indirect dependencies count as well.
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .expect("a root");

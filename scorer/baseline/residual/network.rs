@@ -1,4 +1,6 @@
-//! A network of two hidden layers, trained by Adam (Kingma and Ba 2015) and stopped early on a log that it does not learn from.
+//! A network with two hidden layers, trained by Adam (Kingma and Ba 2015).
+//!
+//! Training stops early by a log from which the network does not learn.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -7,15 +9,15 @@ use tch::{Device, Kind, Tensor};
 
 use super::Sequence;
 
-/// Units of a hidden layer: some thousand weights, for some thousand rows.
+/// Units of a hidden layer: about a thousand weights for about a thousand rows.
 const HIDDEN: i64 = 32;
-/// Step size of Adam: the authors' default is 1e-3; whole batches carry three times that.
+/// Step size of Adam: the authors' default is 1e-3; full batches allow three times that.
 const RATE: f64 = 3e-3;
-/// Steps of Adam at most; one is a pass over all rows.
+/// Maximum number of Adam steps; one is a pass over all rows.
 const STEPS: usize = 1500;
-/// Steps between two looks at the log that stops it.
+/// Steps between two evaluations of the log that stops the training.
 const LOOK: usize = 10;
-/// Looks without a gain after which the training is over.
+/// Evaluations without an improvement after which the training ends.
 const PATIENCE: usize = 15;
 
 /// A trained network.
@@ -27,14 +29,14 @@ pub struct Network {
     outputs: Scale,
 }
 
-/// Mean and deviation by column.
+/// Mean and standard deviation of each column.
 struct Scale {
     mean: Tensor,
     deviation: Tensor,
 }
 
 impl Scale {
-    /// That of the numbers which are no NaN; a column that stands still keeps its size.
+    /// The scale of the finite values of each column; a constant column is not scaled.
     fn of(rows: &Tensor) -> Self {
         let present = rows.isfinite().to_kind(Kind::Float);
         let count = present
@@ -69,7 +71,7 @@ fn stacked(logs: &[Sequence], of: impl Fn(&Sequence) -> Tensor) -> Tensor {
 }
 
 fn inputs(log: &Sequence) -> Tensor {
-    // A replay that diverged tells nothing from there on.
+    // A replay that diverged has no information from there on.
     matrix(&log.inputs, log.width).nan_to_num(0.0, 0.0, 0.0)
 }
 
@@ -78,16 +80,18 @@ fn residuals(log: &Sequence) -> Tensor {
     matrix(&log.residuals, log.residuals.len() / rows.max(1))
 }
 
-/// Held while a network is trained: libtorch has one generator of random numbers for all threads.
+/// Lock for training: libtorch has one random number generator for all threads.
 static SEEDED: Mutex<()> = Mutex::new(());
 
 impl Network {
-    /// Trained on some logs; the last of several stops it. Before its first step it says nothing is left, so that where no
-    /// step helps on that log it says so still. The same seed gives the same network.
+    /// Trains a network on some logs; the last of several logs stops the training.
+    ///
+    /// Before its first step the network predicts zero residuals. If no step helps on the last log,
+    /// it keeps predicting zero. The same seed gives the same network.
     pub fn trained(logs: &[Sequence], seed: u64) -> Self {
         let _alone = SEEDED.lock().unwrap_or_else(PoisonError::into_inner);
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
-        // Sums over rows in one order, whatever the machine.
+        // One thread sums over rows in the same order on every machine.
         tch::set_num_threads(1);
         let (learn, stop) = match logs {
             [learn @ .., stop] if !learn.is_empty() => (learn, std::slice::from_ref(stop)),
@@ -131,7 +135,7 @@ impl Network {
         network
     }
 
-    /// Mean squared difference, of what is present, in units of the residuals' spread.
+    /// Mean squared difference of the finite values, in units of the residuals' standard deviation.
     fn loss(&self, x: &Tensor, y: &Tensor) -> Tensor {
         let wanted = self.outputs.to_unit(y);
         let present = wanted.isfinite().to_kind(Kind::Float);
@@ -141,7 +145,7 @@ impl Network {
         squares.sum(Kind::Float) / present.sum(Kind::Float).clamp_min(1.0)
     }
 
-    /// Goes down on the first rows, and keeps the weights that were best on the second.
+    /// Minimises the loss on the first rows and keeps the weights that are best on the second.
     fn descend(&self, [x, y]: [&Tensor; 2], [held_x, held_y]: [&Tensor; 2]) {
         let Ok(mut adam) = nn::Adam::default().build(&self._weights, RATE) else {
             return;
@@ -173,7 +177,7 @@ impl Network {
         });
     }
 
-    /// What it says is left of the readings of a log, `rows x outputs`, in units of the noise.
+    /// Predicted residuals of a log, `rows x outputs`, in units of the noise.
     pub fn residuals(&self, log: &Sequence) -> Vec<f64> {
         let said = tch::no_grad(|| {
             let unit = self.layers.forward(&self.inputs.to_unit(&inputs(log)));
@@ -191,7 +195,7 @@ mod tests {
     /// Rows of a log.
     const ROWS: usize = 300;
 
-    /// A number that looks drawn, uniform in -1 to 1 (a linear congruential generator, Knuth's MMIX).
+    /// A pseudo-random number, uniform in -1 to 1 (a linear congruential generator, Knuth's MMIX).
     fn draw(state: &mut u64) -> f64 {
         *state = state
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -199,7 +203,8 @@ mod tests {
         (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    /// A log whose residual is `size` times a closed form of command and reading, and noise of deviation one.
+    /// A log whose residual is `size` times a closed form of command and reading, plus noise of
+    /// standard deviation one.
     fn log(number: u64, size: f64) -> Sequence {
         let mut state = number;
         let phase = 6.0 * draw(&mut state);
@@ -208,7 +213,7 @@ mod tests {
             let t = row as f64 * 0.02;
             let (u, q) = ((2.0 * t + phase).sin(), (2.0 * t + phase - 0.6).sin());
             inputs.extend([u, 30.0 + 5.0 * q]);
-            // Uniform noise of deviation one.
+            // Uniform noise of standard deviation one.
             let noise = 3f64.sqrt() * draw(&mut state);
             residuals.push(size * (u * u - 0.5 * q) + noise);
         }
@@ -219,7 +224,8 @@ mod tests {
         }
     }
 
-    /// Root mean square of what is left on a log that the network never saw, before and after.
+    /// Root mean square residual of a log that the network never saw, before and after subtraction
+    /// of its prediction.
     fn gaps(size: f64, seed: u64) -> [f64; 2] {
         let logs: Vec<Sequence> = (1..6).map(|n| log(n, size)).collect();
         let network = Network::trained(&logs, seed);

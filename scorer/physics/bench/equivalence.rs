@@ -1,4 +1,6 @@
-//! Whether two sets of effects are the same physics: what they predict without noise, each fitted to the other.
+//! Decides whether two sets of effects are the same physics.
+//!
+//! One set is fitted to the noise-free predictions of the other.
 
 use asid_core::Result;
 
@@ -7,13 +9,15 @@ use super::{Bench, gap};
 use crate::physics::fit::Fit;
 use crate::physics::model::{Point, World};
 
-/// Difference of noise-free predictions, root mean square in units of the noise, below which two sets of effects are
-/// the same physics: a likelihood ratio could tell them apart from some 400 readings on, were the noise white and
-/// the model otherwise exact, which it is not.
+/// Root mean square difference of noise-free predictions below which two sets are the same physics,
+/// in units of the noise.
+///
+/// A likelihood ratio could distinguish them from about 400 readings, if the noise were white and
+/// the model otherwise exact. It is not.
 pub(super) const SAME: f64 = 0.1;
 
 impl Bench<'_> {
-    /// What a fitted world predicts in the logs to fit to and in those held out, without noise.
+    /// Noise-free predictions of a fitted world, for the training logs and the held-out logs.
     pub(super) fn predictions(
         &mut self,
         world: &World,
@@ -33,8 +37,10 @@ impl Bench<'_> {
         Ok([train, test])
     }
 
-    /// Root mean square difference of `targets` and what a set predicts at its best refit to them, on the logs held
-    /// out, in units of the noise.
+    /// Root mean square difference on the held-out logs between `targets` and a set that is
+    /// refitted to them.
+    ///
+    /// It is in units of the noise.
     pub(super) fn distance(
         &mut self,
         named: &Named<'_>,
@@ -46,7 +52,8 @@ impl Bench<'_> {
         let layout = &self.study.plant.layout;
         let mut values: Vec<f64> = world.unknowns.iter().map(|u| u.start).collect();
         let mut distance = f64::INFINITY;
-        // All to the training logs; then, with these values, the open starts of those held out.
+        // First fit all unknowns to the training logs; then, at these values, the open initial
+        // states of the held-out logs.
         for which in 0..2 {
             let (starts, open) = self.starts(which);
             let mut fit = Fit::new(layout, &world, open)?;
@@ -67,7 +74,7 @@ impl Bench<'_> {
         Ok(distance)
     }
 
-    /// Whether a set without any one of its effects predicts something else than `targets`.
+    /// Whether every effect of a set is needed to predict `targets`.
     pub(super) fn each_is_needed(
         &mut self,
         named: &Named<'_>,

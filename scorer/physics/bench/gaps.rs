@@ -1,4 +1,5 @@
-//! Gaps on the logs held out: identified, as the diagnosis left the model, and the best possible.
+//! Gaps on the held-out logs: of the identified model, of the diagnosis' model, and the best
+//! possible.
 
 use asid_core::Result;
 
@@ -11,14 +12,19 @@ use crate::physics::fit::{Fit, robust_deviation};
 use crate::physics::logs::{HEAD, head_rows};
 use crate::physics::model::{Point, World};
 
-/// Residual, in robust deviations of the best model's, from which on a reading is an outlier of the log and counts for
-/// no model: a normal reading in half a thousand million is.
+/// Residual, in robust standard deviations of the best model, above which a reading is an outlier.
+///
+/// An outlier counts for no model. One normal reading in five hundred million is beyond this limit.
 const OUTLIER: f64 = 6.0;
-/// Excess, in units of the noise, below which there is no gap to close: the contract's 1.05 of the whole gap.
+/// Excess, in units of the noise, below which there is no gap to close: the contract's 1.05 of the
+/// whole gap.
 const NO_GAP: f64 = 0.32;
 
 impl Bench<'_> {
-    /// A point for the logs held out: the values given, and starts fitted to the heads where logs leave them open.
+    /// A point for the held-out logs: the given values, and open initial states fitted to the heads
+    /// of the logs.
+    ///
+    /// The flag says whether initial states were fitted.
     pub(super) fn held_out(&mut self, world: &World, values: &[f64]) -> Result<(Point, bool)> {
         let (starts, open) = self.starts(1);
         let fitted = !open.is_empty();
@@ -32,7 +38,7 @@ impl Bench<'_> {
         Ok((fit.run(&mut heads, point)?, fitted))
     }
 
-    /// Residuals on the logs held out; NaN where a reading is missing or does not count.
+    /// Residuals on the held-out logs; NaN if a reading is missing or does not count.
     fn residuals(&mut self, world: &World, values: &[f64]) -> Result<Vec<Vec<f64>>> {
         let (point, fitted) = self.held_out(world, values)?;
         let mut fit = Fit::new(&self.study.plant.layout, world, Vec::new())?;
@@ -49,7 +55,7 @@ impl Bench<'_> {
         Ok(residuals)
     }
 
-    /// Residuals less what an answer learned of them.
+    /// Subtracts from the residuals what an answer has learned of them.
     fn without_learned(&self, residuals: &[Vec<f64>], answer: &Answer) -> Vec<Vec<f64>> {
         let mut left = residuals.to_vec();
         for (left, learned) in left.iter_mut().zip(&answer.learned) {

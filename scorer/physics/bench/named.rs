@@ -1,4 +1,4 @@
-//! Effects and values as a label or an answer names them: where fits begin.
+//! Effects and values that a label or an answer names: the start of fits.
 
 use asid_effects::EffectSpec;
 
@@ -7,17 +7,19 @@ use crate::catalogue::parameters_of;
 use crate::label::{Label, name_of, site_of};
 use crate::sites::Sites;
 
-/// Value of a parameter of the study, by its name.
+/// Looks up the value of a parameter of the study by its name.
 pub(super) type Known<'a> = Box<dyn Fn(&str) -> Option<f64> + 'a>;
 
-/// Effects with values, and values of the study's parameters, as somebody names them.
+/// Effects with values, and values of the study's parameters, from one source.
 pub(super) struct Named<'a> {
     pub(super) effects: Vec<EffectSpec>,
     pub(super) parameters: Known<'a>,
 }
 
-/// The true effects. A fit begins at the label's values; where it has none that the catalogue knows, at those of the
-/// answer, if it names the same effect.
+/// The true effects, with the start values of a fit.
+///
+/// These are the label's values that the catalogue knows. Without any, they are those of the answer
+/// if it names the same effect.
 pub(super) fn truth<'a>(label: &'a Label, answer: &Answer, sites: &Sites) -> Named<'a> {
     let values = |effect: &String| -> Vec<(String, f64)> {
         let known = parameters_of(name_of(effect)).unwrap_or_default();
@@ -47,7 +49,7 @@ pub(super) fn truth<'a>(label: &'a Label, answer: &Answer, sites: &Sites) -> Nam
     }
 }
 
-/// What the verdict names, with its values.
+/// The verdict's effects with their values.
 pub(super) fn verdict<'a>(answer: &'a Answer) -> Named<'a> {
     let spec = |effect: &String| EffectSpec {
         name: name_of(effect).to_owned(),
