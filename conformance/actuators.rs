@@ -104,7 +104,7 @@ fn wheel(backend: &dyn Backend, actuator: &str) -> Result<Rig> {
 }
 
 fn step_response(backend: &dyn Backend) -> Result<f64> {
-    // 0.1 q'' + 1 q' + 10 q = 10: damped at half of critical.
+    // 0.1 q'' + 1 q' + 10 q = 10: a damping ratio of a half.
     let mut rig = wheel(backend, r#"<position joint="j" kp="10" kv="1"/>"#)?;
     let rows = rig.run(500, &[1.0])?;
     let (omega, zeta) = (10.0, 0.5f64);
@@ -116,14 +116,14 @@ fn step_response(backend: &dyn Backend) -> Result<f64> {
     })))
 }
 
-/// A stiff servo, two seconds after a step to 0.3 rad.
+/// A stiff servo during two seconds after a step to 0.3 rad.
 fn stiff(backend: &dyn Backend) -> Result<Vec<Vec<f64>>> {
     let mut rig = wheel(backend, r#"<position joint="j" kp="4000" kv="400"/>"#)?;
     rig.run(1000, &[0.3])
 }
 
 fn stiff_response(backend: &dyn Backend) -> Result<f64> {
-    // Roots of 0.1 s^2 + 400 s + 4000, far apart.
+    // Roots of 0.1 s^2 + 400 s + 4000, which are far apart.
     let root = (400f64 * 400.0 - 4.0 * 0.1 * 4000.0).sqrt();
     let (slow, fast) = ((400.0 - root) / 0.2, (400.0 + root) / 0.2);
     Ok(largest(stiff(backend)?.iter().enumerate().map(
@@ -139,14 +139,14 @@ fn stiff_rest(backend: &dyn Backend) -> Result<f64> {
     Ok(last(&stiff(backend)?)?[0] - 0.3)
 }
 
-/// An arm of 1 kg at half a metre, held level by a servo.
+/// An arm of 1 kg at half a metre that a servo holds horizontal.
 fn sag(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option integrator="implicitfast"/><worldbody><body><joint name="j" axis="0 1 0"/>
       <inertial pos="0.5 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body></worldbody>
       <actuator><position joint="j" kp="400" kv="40"/></actuator>"#;
     let mut rig = Rig::new(backend, inside, &["qpos.j"])?;
     let angle = last(&rig.run(2000, &[0.0])?)?[0];
-    // Gravity turns the arm down, towards positive angles about y.
+    // Gravity rotates the arm down, towards positive angles about y.
     Ok(relative(400.0 * angle, 0.5 * 9.81 * angle.cos()))
 }
 
@@ -192,7 +192,7 @@ fn servo_gear(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn own_joint(backend: &dyn Backend) -> Result<f64> {
-    // Three wheels, and their motors in another order.
+    // Three wheels; their motors come in another order.
     let wheels: String = ["a", "b", "c"]
         .iter()
         .map(|name| {

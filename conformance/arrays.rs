@@ -1,4 +1,4 @@
-//! Names and places in arrays: the layout, keyframes, quaternions, free joints, rows.
+//! Names and indices in arrays: the layout, keyframes, quaternions, free joints, rows.
 
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -80,8 +80,9 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A weightless free body with a site a metre along its x axis, and its centre
-/// of mass 0.2 m up its z axis.
+/// A free body without gravity.
+///
+/// A site lies one metre along its x axis, its centre of mass 0.2 m along its z axis.
 pub fn floating(backend: &dyn Backend, qpos: [f64; 7], qvel: [f64; 6]) -> Result<Rig> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="b"/>
       <inertial pos="0 0 0.2" mass="1" diaginertia="0.1 0.2 0.3"/><site name="s" pos="1 0 0"/></body></worldbody>
@@ -120,7 +121,7 @@ fn free_linear(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn free_angular(backend: &dyn Backend) -> Result<f64> {
-    // Lying on its side, it turns about its own z axis, which keeps its direction.
+    // The body lies on its side and rotates about its own z axis, which keeps its direction.
     let start = UnitQuaternion::from_quaternion(Quaternion::new(0.6, 0.8, 0.0, 0.0));
     let qpos = [0.0, 0.0, 0.0, start.w, start.i, start.j, start.k];
     let mut rig = floating(backend, qpos, [0.0, 0.0, 0.0, 0.0, 0.0, 3.0])?;

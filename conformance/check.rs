@@ -1,4 +1,4 @@
-//! What a check is, what running it gives, and the printed table.
+//! What a check is, the row that it gives, and the printed table.
 
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -17,7 +17,7 @@ pub struct Tolerance {
 }
 
 impl Tolerance {
-    /// The same for both, where the arithmetic does not matter.
+    /// The same tolerance for both precisions, if the arithmetic does not matter.
     #[must_use]
     pub const fn same(value: f64) -> Self {
         Self {
@@ -26,13 +26,13 @@ impl Tolerance {
         }
     }
 
-    /// Where rounding is what is left.
+    /// A tolerance by precision, if the remaining deviation is rounding.
     #[must_use]
     pub const fn by_precision(double: f64, single: f64) -> Self {
         Self { double, single }
     }
 
-    /// The one that holds for an engine.
+    /// The tolerance that applies to an engine.
     #[must_use]
     pub fn of(self, capabilities: Capabilities) -> f64 {
         if capabilities.contains(Capabilities::DOUBLE_PRECISION) {
@@ -43,12 +43,12 @@ impl Tolerance {
     }
 }
 
-/// One question to an engine, with a number for an answer.
+/// One question to an engine, answered by a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Check {
     /// Name, `family/what`.
     pub name: &'static str,
-    /// What an engine must claim for the question to make sense.
+    /// Capabilities that an engine must claim for the question to make sense.
     pub needs: Capabilities,
     /// Unit of the figure; empty for a ratio or a count.
     pub unit: &'static str,
@@ -63,10 +63,11 @@ pub struct Check {
 /// How a check measures its figure.
 #[derive(Clone, Copy, Debug)]
 pub enum Measure {
-    /// Of every engine that claims what the check needs.
+    /// Measured on every engine that claims what the check needs.
     Figure(fn(&dyn Backend) -> Result<f64>),
-    /// Of what an engine takes without having to: `None` where it refuses all of it, or
-    /// where nothing that it claims could show it.
+    /// Measured on what an engine accepts although it need not.
+    ///
+    /// `None` if it refuses all of it, or if nothing that it claims could show it.
     Taken(fn(&dyn Backend) -> Result<Option<f64>>),
 }
 
@@ -80,13 +81,13 @@ impl Measure {
 }
 
 impl Check {
-    /// The family that it belongs to: the first part of its name.
+    /// The check's family: the first part of its name.
     #[must_use]
     pub fn family(&self) -> &'static str {
         self.name.split('/').next().unwrap_or_default()
     }
 
-    /// Asks a backend. An error or a panic of the engine is a failed row, not an end.
+    /// Runs the check on a backend. An error or a panic of the engine gives a failed row.
     #[must_use]
     pub fn run(&self, backend: &dyn Backend) -> Row {
         let capabilities = backend.capabilities();
@@ -139,18 +140,19 @@ impl Check {
         excused(row, deviations::find(backend.name(), self.name))
     }
 
-    /// The documents that an engine is given when it is asked, in their order and each once:
-    /// those up to the first that ends the check where it refuses one.
+    /// The documents that the check gives to an engine, in order and each once.
+    ///
+    /// If the engine refuses one and this ends the check, later ones are missing.
     #[must_use]
     pub fn scenes(&self, backend: &dyn Backend) -> Vec<String> {
         let named = Named::new(backend, self.name);
-        // What comes of it is not asked for.
+        // The result of the check does not matter here.
         let _ = catch_unwind(AssertUnwindSafe(|| self.measure.of(&named)));
         named.scenes()
     }
 }
 
-/// A row that fails, as what is known of the engine has it.
+/// Turns a failed row into a known deviation if the table of deviations covers it.
 fn excused(mut row: Row, known: Option<&deviations::Deviation>) -> Row {
     if row.outcome == Outcome::Fail
         && let Some(known) = known
@@ -163,22 +165,22 @@ fn excused(mut row: Row, known: Option<&deviations::Deviation>) -> Row {
     row
 }
 
-/// What became of a check.
+/// Outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// Within the tolerance.
     Pass,
-    /// Beyond it, or an error where there should be none.
+    /// Beyond it, or an unexpected error.
     Fail,
-    /// The engine does not claim what the check needs, or refuses what it need not take.
+    /// The engine does not claim what the check needs, or refuses what it need not accept.
     NotClaimed,
-    /// Beyond the tolerance, and within what the table of deviations allows.
+    /// Beyond the tolerance, but within what the table of deviations allows.
     KnownDeviation,
 }
 
 impl Outcome {
-    /// As it is written in tables.
+    /// Text in tables.
     #[must_use]
     pub fn label(self) -> &'static str {
         match self {
@@ -203,23 +205,25 @@ pub struct Row {
     pub engine: String,
     /// Name of the check.
     pub check: String,
-    /// The figure; `None` where there is none.
+    /// The figure, if there is one.
     pub value: Option<f64>,
     /// Largest magnitude that passes.
     pub tolerance: f64,
     /// Unit of both.
     pub unit: String,
-    /// What became of it.
+    /// Outcome.
     pub outcome: Outcome,
     /// Where the tolerance comes from.
     pub reason: String,
-    /// Why there is no figure, what is not claimed, or why a deviation is known.
+    /// Reason why there is no figure, capabilities that are not claimed, or reason of a known
+    /// deviation.
     pub note: String,
 }
 
 impl Row {
-    /// The figure as a part of its tolerance, 1 at the limit; a count where nothing is
-    /// tolerated. `None` where there is no figure.
+    /// The figure as a share of its tolerance, 1 at the limit; a count if the tolerance is zero.
+    ///
+    /// `None` without a figure.
     #[must_use]
     pub fn share(&self) -> Option<f64> {
         let value = self.value?.abs();
@@ -230,13 +234,13 @@ impl Row {
         }
     }
 
-    /// The family of its check.
+    /// The family of the check.
     #[must_use]
     pub fn family(&self) -> &str {
         self.check.split('/').next().unwrap_or_default()
     }
 
-    /// True where the engine does not do what it claims.
+    /// Whether the engine fails to do what it claims.
     #[must_use]
     pub fn is_failure(&self) -> bool {
         self.outcome == Outcome::Fail

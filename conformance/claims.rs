@@ -1,9 +1,9 @@
-//! What an engine does not claim, it refuses; what it takes, acts.
+//! An engine must refuse what it does not claim, or act on it.
 //!
-//! A part of a scene that is silently left out gives a wrong answer without a
-//! word. So each part is asked of every engine: it may refuse, and it may do more
-//! than it claims, but it may not go on as if nothing had been said. And what an
-//! engine claims, some check must be able to see.
+//! If an engine silently ignores a part of a scene, its answer is wrong without any warning. The
+//! checks therefore try each part on every engine. It may refuse the part, and it may support more
+//! than it claims, but it must not ignore the part. And for each capability that an engine claims,
+//! some check must be able to test it.
 
 use asid_core::simulator::{ExternalForce, ParameterChange, StepHook, StepView};
 use asid_core::{Backend, Capabilities, Error, Result};
@@ -66,13 +66,13 @@ fn something_moves(backend: &dyn Backend) -> Result<f64> {
     ))
 }
 
-/// What a claimed bit lacks, where every check of it needs more than is claimed.
+/// Names what a claimed bit lacks, if every check of it needs more than is claimed.
 fn unchecked(bit: Capabilities, claimed: Capabilities) -> Option<String> {
     let lacking: Vec<Capabilities> = crate::checks()
         .filter(|check| check.needs.contains(bit))
         .map(|check| check.needs - claimed)
         .collect();
-    // The fewest bits that would have it checked; no check names a bit of arithmetic.
+    // The smallest number of bits that would enable a check. No check names a bit of arithmetic.
     let least = *lacking.iter().min_by_key(|bits| bits.bits().count_ones())?;
     let names = |bits: Capabilities| {
         let names: Vec<&str> = bits.iter_names().map(|(name, _)| name).collect();
@@ -106,7 +106,7 @@ fn told(found: Vec<String>, before: &str) -> Result<f64> {
     Err(Error::Failed(format!("{before}{}", found.join("; "))))
 }
 
-/// Readings of 50 steps of a document, `None` where the engine refuses it.
+/// Readings of 50 steps of a document; `None` if the engine refuses it.
 fn readings(backend: &dyn Backend, part: &Part, inside: &str) -> Result<Option<Rows>> {
     let Ok(mut rig) = Rig::new(backend, inside, &[part.channel]) else {
         return Ok(None);
@@ -133,7 +133,7 @@ fn scenes(backend: &dyn Backend) -> Result<Option<f64>> {
             left_out.push(part.name.clone());
         }
     }
-    // A body on a joint of a kind that is not known must not stand still.
+    // A body on a joint of an unsupported kind must not stand still.
     for (bits, name, joint) in [
         (
             Capabilities::FREE_BODIES,
@@ -175,7 +175,7 @@ impl StepHook for Stops {
     }
 }
 
-/// True where a rollout goes through and is that of a body that merely falls.
+/// Whether a rollout succeeds and equals that of a body that only falls.
 fn ignores<'a>(backend: &dyn Backend, change: impl FnOnce(&mut Extras<'a>)) -> Result<bool> {
     let body = falling(backend);
     let size = Size {
@@ -220,8 +220,8 @@ fn rollouts(backend: &dyn Backend) -> Result<Option<f64>> {
     told(left_out, "silently left out: ").map(Some)
 }
 
-/// A parameter in a scene where it acts: what must be claimed for the scene, the target,
-/// two values.
+/// A parameter in a scene in which it acts: capabilities that the scene needs, the target, two
+/// values.
 type Probe = (Capabilities, &'static str, &'static str, [f64; 2]);
 
 const ARM: &str = r#"<worldbody><body name="b"><joint name="j" axis="0 1 0"/>

@@ -1,4 +1,4 @@
-//! Contact along the normal: rest, weight, stacks, edges, collisions.
+//! Contact along the normal: rest height, weight, stacks, edges, collisions.
 
 use asid_core::{Backend, Capabilities, Result};
 
@@ -119,7 +119,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A box of 0.5 kg on a plane under tilted gravity, after a second.
+/// A box of 0.5 kg on a plane under tilted gravity, after one second.
 fn resting(backend: &dyn Backend, angle: f64, channels: &[&str]) -> Result<Vec<f64>> {
     let (sin, cos) = angle.sin_cos();
     let inside = format!(
@@ -204,7 +204,7 @@ fn force_passes(backend: &dyn Backend) -> Result<f64> {
     ))
 }
 
-/// Three boxes of 0.3 kg, one on the other, after two seconds.
+/// Three stacked boxes of 0.3 kg, after two seconds.
 fn stack(backend: &dyn Backend, channels: &[&str]) -> Result<Vec<f64>> {
     let boxes: String = (0..3)
         .map(|i| {
@@ -248,7 +248,7 @@ fn tips_over(backend: &dyn Backend) -> Result<f64> {
     Ok(broken([stands[0], !stands[1]]))
 }
 
-/// Two balls meet off centre without gravity: velocities before and after.
+/// Two balls that collide off centre without gravity: velocities before and after.
 fn collision(backend: &dyn Backend) -> Result<[Vec<f64>; 2]> {
     let inside = r#"<option gravity="0 0 0"/><worldbody>
       <body pos="-0.2 0 0"><freejoint name="a"/><geom type="sphere" size=".05" mass="0.4"/></body>
@@ -267,7 +267,7 @@ fn collision(backend: &dyn Backend) -> Result<[Vec<f64>; 2]> {
 fn collision_momentum(backend: &dyn Backend) -> Result<f64> {
     let [before, after] = collision(backend)?;
     if after[6] < 0.1 {
-        // They went through each other.
+        // The balls passed through each other.
         return Ok(f64::NAN);
     }
     let momentum = |v: &[f64], i: usize| 0.4 * v[i] + v[6 + i];

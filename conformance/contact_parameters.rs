@@ -1,4 +1,4 @@
-//! Parameters of contact: friction, softness, and where a geom is.
+//! Parameters of contact: friction, softness and position of a geom.
 
 use asid_core::{Backend, Capabilities, Result};
 
@@ -56,7 +56,7 @@ pub const CHECKS: &[Check] = &[
 /// Radius of the ball, m.
 const RADIUS: f64 = 0.05;
 
-/// A ball on a plane, settled and then sent off; the friction of the plane counts.
+/// A ball that settles on a plane and is then launched; the plane's friction counts.
 fn ball(
     backend: &dyn Backend,
     (condim, friction): (u32, &str),

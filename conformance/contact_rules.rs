@@ -1,4 +1,4 @@
-//! Which geoms meet, whose friction counts, and between whom a force is read.
+//! Which geoms collide, whose friction counts, and between which bodies a force is read.
 
 use asid_core::simulator::ExternalForce;
 use asid_core::{Backend, Capabilities, Result};
@@ -92,7 +92,7 @@ fn who_meets(backend: &dyn Backend) -> Result<f64> {
     let mut rig = Rig::new(backend, inside, &channels)?;
     let rows = rig.run(250, &[])?;
     let end = last(&rows)?;
-    // What meets nothing has fallen freely for half a second.
+    // A body that collides with nothing has fallen freely for half a second.
     let fallen = 0.05 - 0.5 * G * 0.25;
     let near = |z: f64, height: f64| (z - height).abs() < 2.0 * G * STEP;
     Ok(broken([
@@ -113,7 +113,8 @@ fn parent_and_child(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(rows[0][0], G * 0.1 / inertia * STEP))
 }
 
-/// Where a block of 1 m/s comes to rest, on a plane of these rules.
+/// Position at which a block with an initial speed of 1 m/s stops, on a plane with these
+/// attributes.
 fn stop(backend: &dyn Backend, plane: &str, block: &str, more: &str) -> Result<f64> {
     let inside = format!(
         r#"<option cone="elliptic" impratio="100"/><worldbody>
@@ -187,7 +188,8 @@ fn tips_when_pushed(backend: &dyn Backend) -> Result<f64> {
                 wrench: &wrench,
             });
         })?;
-        // Its vertical axis: 1 where it stands, less by a tenth of a radian's worth.
+        // The vertical component of its axis: 1 if it stands, 0.995 at a tilt of a tenth of a
+        // radian.
         let end = last(&rows)?;
         *stands = 1.0 - 2.0 * (end[4] * end[4] + end[5] * end[5]) > 0.995;
     }

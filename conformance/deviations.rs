@@ -1,4 +1,4 @@
-//! The table of what engines are known to get wrong, as data beside the checks.
+//! The table of known deviations of engines, as data beside the checks.
 
 use std::sync::LazyLock;
 
@@ -14,7 +14,7 @@ pub struct Deviation {
     pub check: String,
     /// Largest magnitude of the figure that is accepted.
     pub allowed: f64,
-    /// Why it is so.
+    /// Reason of the deviation.
     pub reason: String,
 }
 
@@ -25,8 +25,8 @@ struct Table {
     deviation: Vec<Deviation>,
 }
 
-// A table that does not parse counts as empty, so that nothing is excused by
-// it; a test of this module reads it.
+// A table that does not parse counts as empty, so that it excuses nothing. A test of this module
+// parses it.
 static TABLE: LazyLock<Vec<Deviation>> = LazyLock::new(|| {
     toml::from_str::<Table>(include_str!("deviations.toml"))
         .map(|table| table.deviation)

@@ -1,8 +1,7 @@
-//! Simulations that leave the plausible range: reported, alone, and able to recover.
+//! Simulations that diverge: they are reported, do not affect others, and can recover.
 //!
-//! A state counts as diverged at the latest when a position, a velocity or an
-//! acceleration is not finite or beyond 1e10; an engine may be stricter.
-//! Every figure is a number of broken promises.
+//! A state counts as diverged at the latest when a position, a velocity or an acceleration is not
+//! finite or beyond 1e10. An engine may be stricter. Every figure is a number of broken promises.
 
 use asid_core::simulator::ExternalForce;
 use asid_core::{Backend, Capabilities, Result, Status};
@@ -64,15 +63,15 @@ pub const CHECKS: &[Check] = &[
     ),
 ];
 
-/// Gravity beyond reason, m/s²: a body that falls for a step has a speed of 2e13 m/s.
+/// Excessive gravity, m/s²: a body that falls for one step has a speed of 2e13 m/s.
 const HUGE: f64 = -1e16;
 
-/// Frames before the one in which the second of three simulations is blown up.
+/// Frames before the one in which the second of three simulations diverges.
 const GOOD: usize = 10;
-/// Frames from that one on.
+/// Frames from that one onwards.
 const REST: usize = 30;
 
-/// Rolls three simulations, with gravity beyond reason in the second after a while.
+/// Rolls out three simulations; the second gets `gravity` after a while.
 fn blown(rig: &mut Rig, gravity: f64) -> Result<[Rows; 2]> {
     let ctrl = rig.command(0.5);
     let good = rig.run_with(GOOD, 2, &ctrl, |_| {})?;
@@ -178,7 +177,7 @@ fn huge_forces(backend: &dyn Backend) -> Result<f64> {
     Ok(broken(ended))
 }
 
-/// True where rows are finite until a simulation diverges, and say so then.
+/// Whether rows are finite until a simulation diverges, and the status reports the divergence.
 fn honest(rows: &[Vec<f64>], status: &Status) -> bool {
     let first = rows
         .iter()

@@ -1,4 +1,4 @@
-//! Free motion and trees of joints without contact.
+//! Free motion and kinematic trees without contact.
 
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
@@ -133,7 +133,7 @@ fn free_fall_velocity(backend: &dyn Backend) -> Result<f64> {
     Ok(largest((0..6).map(|i| end[7 + i] - theory[i])))
 }
 
-/// Angular momentum of a tumbling box in the world, after a second without torque.
+/// Angular momentum of a tumbling box in the world, after one second without torque.
 fn tumbling_momentum(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="b"/>
       <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.02 0.025"/></body></worldbody>"#;
@@ -153,7 +153,7 @@ fn tumbling_momentum(backend: &dyn Backend) -> Result<f64> {
     Ok((after - before).norm() / before.norm())
 }
 
-/// A free body with a swinging arm: its centre of mass flies straight.
+/// A free body with a swinging arm: its centre of mass moves on a straight line.
 fn thrown_arm(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody>
       <body name="a"><freejoint name="a"/><inertial pos="0 0 0" mass="2" diaginertia=".02 .02 .02"/>
@@ -166,17 +166,17 @@ fn thrown_arm(backend: &dyn Backend) -> Result<f64> {
         &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
         &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10.0],
     )?;
-    // Half of the mass moves at 2 m/s along y: the centre of mass at 1 m/s.
+    // Half of the mass moves at 2 m/s along y, so the centre of mass moves at 1 m/s.
     let rows = rig.run(500, &[])?;
     let end = last(&rows)?;
     let center = |i: usize| 0.5 * (end[i] + end[3 + i]);
     Ok(largest([center(0), center(1) - 1.0, center(2)]))
 }
 
-/// Inertia of the pendulum about its axis, kg m²: 1 kg at 0.5 m, and that of its ball.
+/// Inertia of the pendulum about its axis, kg m²: 1 kg at 0.5 m, plus that of its ball.
 const PENDULUM_INERTIA: f64 = 0.25 + 0.4 * 0.02 * 0.02;
 
-/// A bob of 1 kg on half a metre, let go at 1 rad: 10 s of angle and rate.
+/// A bob of 1 kg on half a metre, released at 1 rad: 10 s of angle and rate.
 fn pendulum(backend: &dyn Backend) -> Result<Vec<Vec<f64>>> {
     let inside = r#"<worldbody><body pos="0 0 1"><joint name="j" axis="0 1 0"/>
       <geom type="sphere" size=".02" pos="0 0 -0.5" mass="1" contype="0" conaffinity="0"/></body></worldbody>"#;
@@ -213,7 +213,7 @@ fn unit_torque(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(last(&rig.run(50, &[1.0])?)?[0], 0.1 / inertia))
 }
 
-/// Shapes of 800 kg/m³ half a metre from a hinge about z, their axis along x.
+/// Shapes of 800 kg/m³ at half a metre from a hinge about z, with their axis along x.
 fn inertia_of_shapes(backend: &dyn Backend) -> Result<f64> {
     let pi = std::f64::consts::PI;
     let density = 800.0;
@@ -223,11 +223,11 @@ fn inertia_of_shapes(backend: &dyn Backend) -> Result<f64> {
     let cylinder = density * pi * r * r * h;
     let caps = density * 4.0 / 3.0 * pi * r.powi(3);
     let across = cylinder * (3.0 * r * r + h * h) / 12.0;
-    // Two half balls whose centres lie 3/8 r beyond the ends of the cylinder.
+    // Two half balls, whose centres lie 3/8 r beyond the ends of the cylinder.
     let half_balls = caps * (0.4 * r * r + 0.25 * h * h + 0.375 * r * h);
     let shapes = [
         ("sphere", ".1", sphere, 0.4 * sphere * 0.01),
-        // Turned to x, its z side lies along x and its x side along -z.
+        // After the rotation to x, its z side lies along x and its x side along -z.
         (
             "box",
             ".1 .15 .2",
@@ -261,7 +261,7 @@ fn unit_force(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(last(&rig.run(50, &[1.0])?)?[0], 0.05))
 }
 
-/// Two links at a right angle, a torque on each.
+/// Two links at a right angle, with a torque on each.
 fn coupled_links(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody>
       <body><joint name="a" axis="0 0 1"/><inertial pos=".2 0 0" mass="1" diaginertia=".01 .01 .01"/>
@@ -284,7 +284,7 @@ fn coupled_links(backend: &dyn Backend) -> Result<f64> {
     Ok((found - theory).norm() / theory.norm())
 }
 
-/// A bead that slides out along a turning rod: angular momentum stays.
+/// A bead that slides outwards along a rotating rod: angular momentum is conserved.
 fn coriolis(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody>
       <body><joint name="turn" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/>
@@ -298,7 +298,7 @@ fn coriolis(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(momentum(end[0], end[1]), momentum(0.2, 5.0)))
 }
 
-/// An isotropic body on a ball joint turns at a constant rate.
+/// An isotropic body on a ball joint rotates at a constant rate.
 fn ball_joint(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" type="ball"/>
       <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>"#;

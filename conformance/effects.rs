@@ -1,4 +1,4 @@
-//! What effects do through a hook before each physics step: forces and commands.
+//! Effects that act through a hook before each physics step: forces and commands.
 
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Backend, Capabilities, Result};
@@ -73,7 +73,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A hook made of a function of the step and the view.
+/// A hook given by a function of the step and the view.
 pub struct By<F>(pub F);
 
 impl<F: Fn(usize, &mut StepView<'_>) + Sync> StepHook for By<F> {
@@ -82,7 +82,7 @@ impl<F: Fn(usize, &mut StepView<'_>) + Sync> StepHook for By<F> {
     }
 }
 
-/// A wheel of 0.1 kg m² with what acts on its joint and what drives it.
+/// A wheel of 0.1 kg m² with attributes of its joint and an actuator.
 fn wheel(backend: &dyn Backend, joint: &str, actuator: &str) -> Result<Rig> {
     let inside = format!(
         r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1" {joint}/>
@@ -93,7 +93,7 @@ fn wheel(backend: &dyn Backend, joint: &str, actuator: &str) -> Result<Rig> {
 
 const MOTOR: &str = r#"<actuator><motor joint="j"/></actuator>"#;
 
-/// Rate of a wheel after some frames of two steps under a hook.
+/// Rate of a wheel after some frames of two steps each under a hook.
 fn rate(
     mut rig: Rig,
     start: f64,
@@ -113,13 +113,15 @@ fn adds(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(found, 0.5 / 0.1 * 50.0 * STEP))
 }
 
-/// A force at the origin along the world's axes and a torque about it along the body's, on
-/// a body that is turned and whose centre of mass is elsewhere: velocities after a step.
+/// Velocities after one step under a force and a torque.
+///
+/// The force acts at the origin along the world's axes, the torque along the body's axes. The body
+/// is rotated, and its centre of mass is not at its origin.
 fn pushes(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="b"/>
       <inertial pos=".1 -.05 .2" mass="2" diaginertia="0.1 0.2 0.25"/></body></worldbody>"#;
     let mut rig = Rig::new(backend, inside, &["qvel.b"])?;
-    // A quarter turn about x, so that the frames differ.
+    // A quarter turn about x makes the two frames differ.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     rig.place(&[0.0, 0.0, 0.0, half, half, 0.0, 0.0], &[0.0; 6])?;
     let (force, torque) = (Vector3::new(1.0, -2.0, 3.0), Vector3::new(0.2, -0.3, 0.4));

@@ -1,4 +1,4 @@
-//! Equality constraints: welds, points that coincide, coupled joints.
+//! Equality constraints: welds, coincident points, coupled joints.
 
 use asid_core::{Backend, Capabilities, Result};
 
@@ -55,7 +55,7 @@ fn weld_holds(backend: &dyn Backend) -> Result<f64> {
     Ok(largest([end[0] - 0.1, end[1], end[2] - 1.0]))
 }
 
-/// Two wheels of 0.1 kg m², the second coupled to turn twice as far as the first.
+/// Two wheels of 0.1 kg m²; the coupling makes the second turn twice as far as the first.
 fn coupling(backend: &dyn Backend) -> Result<f64> {
     let wheel = |name: &str| {
         format!(
@@ -76,13 +76,13 @@ fn coupling(backend: &dyn Backend) -> Result<f64> {
     Ok(largest([relative(end[0], 1.0), relative(end[1], 2.0)]))
 }
 
-/// A bob of 1 kg held by a point half a metre above it, let go at 0.3 m/s: 5 s of places.
+/// A bob of 1 kg held by a point half a metre above it, released at 0.3 m/s: 5 s of positions.
 fn connected(backend: &dyn Backend) -> Result<Vec<Vec<f64>>> {
     let inside = r#"<worldbody><body name="b" pos="0 0 1"><freejoint name="b"/>
         <inertial pos="0 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></worldbody>
       <equality><connect body1="b" body2="world" anchor="0 0 0.5"/></equality>"#;
     let mut rig = Rig::new(backend, inside, &["qpos.b"])?;
-    // About the anchor, so that it is held from the start.
+    // The velocity is a rotation about the anchor, so that the constraint holds from the start.
     rig.place(
         &[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0],
         &[-0.3, 0.0, 0.0, 0.0, 0.6, 0.0],
@@ -91,7 +91,7 @@ fn connected(backend: &dyn Backend) -> Result<Vec<Vec<f64>>> {
 }
 
 fn connect_holds(backend: &dyn Backend) -> Result<f64> {
-    // The anchor half a metre along the body's z axis, against where it was.
+    // The anchor, half a metre along the body's z axis, compared with its initial position.
     Ok(largest(connected(backend)?.iter().flat_map(|q| {
         let (w, x, y, z) = (q[3], q[4], q[5], q[6]);
         [
@@ -105,7 +105,7 @@ fn connect_holds(backend: &dyn Backend) -> Result<f64> {
 fn connect_swings(backend: &dyn Backend) -> Result<f64> {
     let places: Vec<f64> = connected(backend)?.iter().map(|q| q[0]).collect();
     let omega = (G * 0.5 / (0.25 + 1e-3)).sqrt();
-    // The amplitude follows from the energy of the start, and the period from the amplitude.
+    // The initial energy gives the amplitude, and the amplitude gives the period.
     let amplitude = 2.0 * (0.3 / (2.0 * 0.5 * omega)).asin();
     let (mut a, mut b) = (1.0, (0.5 * amplitude).cos());
     for _ in 0..5 {

@@ -1,5 +1,4 @@
-//! Calls that make no sense: each is an error, and none changes anything or
-//! ends the process.
+//! Invalid calls: each must be an error, change nothing and not end the process.
 //!
 //! Every figure is a number of broken promises.
 
@@ -11,7 +10,7 @@ use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, broken, differing_bits};
 use crate::subject::{batch, stirred, subject};
 
-/// What every engine has to do.
+/// No capability: every engine must pass the check.
 pub const ANY: Capabilities = Capabilities::empty();
 
 /// A check that counts broken promises.
@@ -98,7 +97,7 @@ fn not_finite(backend: &dyn Backend) -> Result<f64> {
         values.iter_mut().take(1).for_each(|value| *value = with);
         values
     };
-    // Where nothing moves, there is no state to spoil.
+    // If nothing moves, there is no state to corrupt.
     let still = nq == 0;
     let mut commanded = |value: f64| {
         let ctrl = rig.command(value);
@@ -259,7 +258,7 @@ fn bad_call_changes_nothing(backend: &dyn Backend) -> Result<f64> {
         return Err(Error::Failed("a bad call was accepted".into()));
     }
     let unmoved = differing_bits(&before, &rig.read()?);
-    // Neither states nor parameters: it goes on like one that never heard of them.
+    // States and parameters are unchanged: it continues like a simulation that never had the calls.
     let mut other = stirred(backend, 3, 2)?;
     other.run(20, &half)?;
     Ok(unmoved + differing_bits(&rig.run(20, &half)?, &other.run(20, &half)?))
@@ -288,14 +287,14 @@ fn nothing_to_do(backend: &dyn Backend) -> Result<f64> {
         simulator.read(&[], &rig.record, &mut []).is_ok(),
         differing_bits(&before, &rig.read()?) == 0.0,
     ];
-    // Whether these two are errors is the engine's choice.
+    // An engine may choose whether these two are errors.
     let _ = rig.run_with(2, 0, &ctrl, |_| {});
     let _ = batch(backend, 0, 2).and_then(|mut rig| rig.run(2, &ctrl));
     Ok(broken(calls))
 }
 
 fn bad_scenes(backend: &dyn Backend) -> Result<f64> {
-    // What is good about them is known to load.
+    // The valid parts of these documents are known to load.
     Rig::new(backend, &subject(backend).inside, &[])?;
     let refused = |inside: &str| {
         Scene::from_xml("bad", &format!("<mujoco>{inside}</mujoco>"), &[])

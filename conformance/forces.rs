@@ -63,8 +63,9 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A body of 2 kg whose centre of mass is not its origin, under a wrench on
-/// each frame, and what it reads: centre of mass's velocity, then `qvel`.
+/// A body of 2 kg with its centre of mass off its origin, under one wrench per frame.
+///
+/// The readings are the velocity of its centre of mass, then `qvel`.
 fn pushed(backend: &dyn Backend, wrenches: &[[f64; 6]]) -> Result<(Rig, Vec<Vec<f64>>)> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="b"/>
       <inertial pos="0.2 0 0" mass="2" diaginertia="0.1 0.2 0.25"/></body></worldbody>

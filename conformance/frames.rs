@@ -1,4 +1,4 @@
-//! Frames of bodies and sites: sensors against forward kinematics by hand.
+//! Frames of bodies and sites: sensors against forward kinematics computed by hand.
 
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -80,7 +80,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A turned and moving chain: what its tip reads, and what it should.
+/// A rotated and moving chain: the readings at its tip, and their expected values.
 struct Tip {
     read: Vec<f64>,
     place: Vector3<f64>,
@@ -109,11 +109,11 @@ fn tip(backend: &dyn Backend) -> Result<Tip> {
 
     let turn = |w, x, y, z| UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
     let about = |axis: Vector3<f64>, angle| UnitQuaternion::from_scaled_axis(axis * angle);
-    // The first body turns about its own origin.
+    // The first body rotates about its own origin.
     let first = turn(0.8, 0.0, 0.0, 0.6) * about(Vector3::y(), a);
     let first_at = Vector3::new(0.1, 0.2, 0.3);
     let first_rate = turn(0.8, 0.0, 0.0, 0.6) * Vector3::y() * va;
-    // The second slides along an axis of its own frame.
+    // The second body slides along an axis of its own frame.
     let second = first * turn(0.6, 0.8, 0.0, 0.0);
     let along = second * Vector3::new(0.0, 0.6, 0.8);
     let second_at = first_at + first * Vector3::new(0.4, 0.0, 0.1) + along * b;
@@ -162,7 +162,7 @@ fn joint_sensors(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn body_frames(backend: &dyn Backend) -> Result<f64> {
-    // Turned a quarter about x: its z axis points along -y.
+    // After a quarter turn about x its z axis points along -y.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let qpos = [1.0, 2.0, 3.0, half, half, 0.0, 0.0];
     let read = floating(backend, qpos, [0.0; 6])?.read()?.swap_remove(0);
@@ -170,14 +170,14 @@ fn body_frames(backend: &dyn Backend) -> Result<f64> {
     Ok(largest((0..6).map(|i| read[3 + i] - theory[i])))
 }
 
-/// Sites of one body whose orientation is written in each of MJCF's ways.
+/// Sites of one body whose orientations are written in each of MJCF's ways.
 fn orientations(backend: &dyn Backend) -> Result<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * 0.6)
         * UnitQuaternion::from_scaled_axis(Vector3::y() * -0.4)
         * UnitQuaternion::from_scaled_axis(Vector3::z() * 1.1);
     let written = |v: Vector3<f64>| format!("{:?} {:?} {:?}", v.x, v.y, v.z);
     let axis = turn.axis().map_or(Vector3::zeros(), |a| a.into_inner());
-    // The least rotation that carries z to where this one carries it.
+    // The smallest rotation that takes the z axis to its rotated direction.
     let least =
         UnitQuaternion::rotation_between(&Vector3::z(), &(turn * Vector3::z())).unwrap_or_default();
     let ways = [
@@ -192,7 +192,7 @@ fn orientations(backend: &dyn Backend) -> Result<f64> {
             format!(r#"axisangle="{} {:?}""#, written(axis), turn.angle()),
             turn,
         ),
-        // By default the angles turn about the turned axes, x first.
+        // By default the angles are about the rotated axes, x first.
         (r#"euler="0.6 -0.4 1.1""#.to_owned(), turn),
         (
             format!(
@@ -222,7 +222,7 @@ fn orientations(backend: &dyn Backend) -> Result<f64> {
     Ok(largest(errors))
 }
 
-/// A document in degrees, as documents are where they say nothing else.
+/// A document in degrees, the unit of documents that name none.
 fn degrees(backend: &dyn Backend) -> Result<f64> {
     let xml = r#"<mujoco><worldbody>
       <body euler="0 0 30"><joint name="h" axis="0 0 1" ref="45"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>

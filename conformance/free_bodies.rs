@@ -1,6 +1,7 @@
-//! What an engine of free bodies may refuse, and must get right where it takes it:
-//! inertia along other axes than the body's, sensors of any kind, masses as parameters,
-//! dampers on a free joint.
+//! Features that an engine of free bodies may refuse but must get right if it accepts them.
+//!
+//! These are inertia along other axes than the body's, sensors of any kind, masses as parameters,
+//! and dampers on a free joint.
 
 use asid_core::simulator::{ExternalForce, StepHook, StepView};
 use asid_core::{Backend, Capabilities, Error, Result};
@@ -64,7 +65,7 @@ fn turn(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
-/// Angular momentum about the centre of mass, in the world, after a second without torque.
+/// Angular momentum about the centre of mass in the world, after one second without torque.
 fn turned_inertia(backend: &dyn Backend) -> Result<Option<f64>> {
     let axes = turn(0.8, 0.0, 0.6, 0.0).to_rotation_matrix().into_inner();
     let inertia =
@@ -117,8 +118,10 @@ fn damping(backend: &dyn Backend) -> Result<Option<f64>> {
     )))
 }
 
-/// A force along y through the centre of mass and a torque about z, as a hook adds them at
-/// the body's origin; the centre is a place along x for each row.
+/// A force along y through the centre of mass and a torque about z, which a hook adds at the body's
+/// origin.
+///
+/// `center` is the position of the centre of mass along x, by row.
 struct Push {
     force: f64,
     torque: f64,
@@ -132,14 +135,14 @@ impl StepHook for Push {
     }
 }
 
-/// How the velocities of a box of 2 kg answer from rest, with nominal and with other masses.
+/// Velocities of a box of 2 kg after a push from rest, with nominal and with other masses.
 fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
     let capabilities = backend.capabilities();
     let wrenches = capabilities.contains(Capabilities::EXTERNAL_FORCES);
     if !wrenches && !capabilities.contains(Capabilities::STEP_HOOKS) {
         return Ok(None);
     }
-    // What is claimed may not be refused.
+    // An engine must not refuse what it claims.
     let claimed = capabilities.contains(MASS);
     let center = 0.2;
     let nominal = [
@@ -156,7 +159,7 @@ fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
     let ask = |target: &str, value: f64, force: f64, torque: f64, center: [f64; 2]| {
         let mut rig = pair(backend, &inside, &["qvel.b"], &[(target, value)])?;
         let wrench = [0.0, force, 0.0, 0.0, 0.0, torque].repeat(2);
-        // The same at the origin, as a hook acts.
+        // The same wrench, applied at the origin by a hook.
         let hook = Push {
             force,
             torque,
@@ -209,7 +212,7 @@ fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
     ask_about("body/b/ipos/0", &|| {
         let centers = [center, 0.35];
         let turned = ask("body/b/ipos/0", 0.35, 0.0, 0.5, centers)?;
-        // The centre of mass stays, so the origin goes the other way.
+        // The centre of mass stays at rest, so the origin moves the other way.
         let origin = centers.map(|c| -c * 0.5 / nominal[2] * STEP);
         let pushed = ask("body/b/ipos/0", 0.35, 3.0, 0.0, centers)?;
         Ok(largest([

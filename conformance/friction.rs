@@ -1,4 +1,4 @@
-//! Friction of contacts: sliding, rolling, spinning.
+//! Friction of contacts: sliding, rolling and torsional.
 
 use asid_core::{Backend, Capabilities, Result};
 
@@ -112,7 +112,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// Friction as hard as MJCF asks for: the round cone, a hundred times as stiff as the normal.
+/// The hardest friction that MJCF allows: an elliptic cone, a hundred times as stiff as the normal.
 const ROUND: &str = r#"cone="elliptic" impratio="100""#;
 
 /// A box of 0.5 kg on a plane with gravity tilted by `angle` towards x.
@@ -139,17 +139,18 @@ fn incline_slides(backend: &dyn Backend) -> Result<f64> {
     let angle = 1.3 * 0.3f64.atan();
     let mut rig = block(backend, 0.3, 0.1, angle)?;
     let rows = rig.run(500, &[])?;
-    // The second difference of places: a soft contact rattles in its velocities.
+    // The second difference of positions; velocities of a soft contact fluctuate.
     let found = (rows[499][0] - 2.0 * rows[299][0] + rows[99][0]) / (200.0 * STEP).powi(2);
     Ok(relative(found, G * (angle.sin() - 0.3 * angle.cos())))
 }
 
-/// Height at which a body has settled into its soft contact after 0.3 s.
+/// Height at which a body has settled in its soft contact after 0.3 s.
 fn settled(rig: &mut Rig) -> Result<f64> {
     Ok(last(&rig.run(150, &[])?)?[2])
 }
 
-/// Where a block of 1 m/s stops, going at `heading` from x, turned by `yaw`.
+/// Position at which a block with 1 m/s stops. It moves at an angle of `heading` from x and is
+/// rotated by `yaw`.
 fn stop(backend: &dyn Backend, plane: f64, own: f64, heading: f64, yaw: f64) -> Result<[f64; 2]> {
     let mut rig = block(backend, plane, own, 0.0)?;
     let half = 0.5 * yaw;
@@ -191,7 +192,7 @@ fn every_direction(backend: &dyn Backend) -> Result<f64> {
     Ok(largest(errors))
 }
 
-/// Two fingers press a box of 0.5 kg from both sides and let it go or not.
+/// Two fingers press a box of 0.5 kg from both sides; it stays or slips.
 fn grip(backend: &dyn Backend) -> Result<f64> {
     let finger = |name: &str, side: f64| {
         format!(
@@ -213,7 +214,7 @@ fn grip(backend: &dyn Backend) -> Result<f64> {
         let mut rig = Rig::new(backend, &inside, &["qpos.box"])?;
         let force = 0.5 * G / (2.0 * 0.4 * share);
         let rows = rig.run(250, &[force, force])?;
-        // Eleven tenths fall by (1 - 1 / 1.1) g t^2 / 2 = 0.1 m in half a second.
+        // At a share of 1.1 it falls by (1 - 1 / 1.1) g t^2 / 2 = 0.1 m in half a second.
         *held = last(&rows)?[2] > -0.01;
     }
     Ok(broken([held[0], !held[1]]))
@@ -233,7 +234,7 @@ fn ball(backend: &dyn Backend, condim: u32, friction: &str, push: f64) -> Result
     Rig::new(backend, &inside, &["qpos.b", "qvel.b"])
 }
 
-/// Gives a ball that has settled a velocity.
+/// Gives a settled ball a velocity.
 fn launch(rig: &mut Rig, qvel: [f64; 6]) -> Result<()> {
     let height = settled(rig)?;
     rig.place(&[0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], &qvel)
@@ -272,7 +273,7 @@ fn ball_holds(backend: &dyn Backend) -> Result<f64> {
     Ok(rows[999][0] - rows[499][0])
 }
 
-/// A ball that starts to spin at 60 rad/s about the vertical: its rate over a second.
+/// A ball that spins at 60 rad/s about the vertical at first: its rate over one second.
 fn spinning(backend: &dyn Backend) -> Result<Vec<f64>> {
     let mut rig = ball(backend, 4, "1 0.01 0", 0.0)?;
     launch(&mut rig, [0.0, 0.0, 0.0, 0.0, 0.0, 60.0])?;

@@ -1,4 +1,4 @@
-//! What a hook is shown, and when: the state of the step before, once a step, at its time.
+//! What a hook sees, and when: the state before the step, once per step, at its time.
 
 use std::sync::Mutex;
 
@@ -62,7 +62,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// What a hook was shown in one call.
+/// What a hook saw in one call.
 struct Call {
     row: usize,
     step: usize,
@@ -72,12 +72,12 @@ struct Call {
     force: Vec<f64>,
 }
 
-/// Writes down what it is shown.
+/// Records what it sees.
 #[derive(Default)]
 struct Diary(Mutex<Vec<Call>>);
 
 impl Diary {
-    /// The calls of a row, in the order in which they came.
+    /// The calls of a row in their order.
     fn of(self, row: usize) -> Result<Vec<Call>> {
         let calls = self.0.into_inner();
         let calls = calls.map_err(|_| Error::Failed("a hook panicked".into()))?;
@@ -100,7 +100,7 @@ impl StepHook for Diary {
     }
 }
 
-/// Positions of all joints, then their velocities, as a hook is shown them.
+/// Records positions of all joints, then their velocities, in the order of a hook's view.
 fn record_state(rig: &mut Rig) -> Result<()> {
     let layout = rig.model.layout();
     let names = state_channels(layout);

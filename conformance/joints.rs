@@ -142,7 +142,7 @@ fn armature(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(last(&rig.run(50, &[1.0])?)?[0], 0.1 / 0.25))
 }
 
-/// Wheels of 0.1 kg m² whose armature comes from four places of a document.
+/// Wheels of 0.1 kg m² whose armature comes from four different places of a document.
 fn defaults(backend: &dyn Backend) -> Result<f64> {
     let wheel = |body: &str, joint: &str| {
         format!(
@@ -179,7 +179,7 @@ fn terminal_speed(backend: &dyn Backend) -> Result<f64> {
     Ok(relative(last(&rig.run(1000, &[0.7])?)?[0], 0.7))
 }
 
-/// A spring of 10 rad/s let go at 0.1 m: a second of positions.
+/// A spring with 10 rad/s, released at 0.1 m: positions over 1.34 s.
 fn spring(backend: &dyn Backend) -> Result<Vec<f64>> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body>
       <joint name="j" type="slide" axis="1 0 0" stiffness="200"/>
@@ -196,7 +196,7 @@ fn spring_frequency(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn spring_amplitude(backend: &dyn Backend) -> Result<f64> {
-    // The peak nearest to one second is the one after a period and a half, a trough.
+    // The extremum nearest to one second is the trough after one and a half periods.
     let samples = spring(backend)?;
     let trough = largest(samples[400..550].iter().copied());
     Ok(relative(trough, 0.1))
@@ -210,7 +210,7 @@ fn spring_rest(backend: &dyn Backend) -> Result<f64> {
     Ok(largest([start, rest]))
 }
 
-/// Dry friction as hard as MJCF can ask for without becoming stiff.
+/// The hardest dry friction that MJCF allows without becoming stiff.
 const HARD: &str = r#"solreffriction="0.02 1" solimpfriction="0.999 0.999 0.001""#;
 
 fn dry_friction_holds(backend: &dyn Backend) -> Result<f64> {

@@ -1,4 +1,4 @@
-//! The layout that follows from a document alone, and the start that its keyframe says.
+//! The layout that follows from a document alone, and the initial state of its keyframe.
 
 use asid_core::layout::{Actuator, Joint, JointKind, Keyframe, Sensor};
 use asid_core::{Backend, Capabilities, Layout, Result};
@@ -6,7 +6,7 @@ use asid_core::{Backend, Capabilities, Layout, Result};
 use crate::rig::{Rig, STEP, broken, largest, state_channels};
 use crate::subject::GHOST;
 
-/// A document of what an engine claims, with the layout and the start that follow.
+/// A document of what an engine claims, with the expected layout and initial state.
 struct Expected {
     inside: String,
     layout: Layout,
@@ -132,7 +132,7 @@ fn expected(backend: &dyn Backend) -> Expected {
     expected
 }
 
-/// Parts of the layout that differ from the document.
+/// Number of parts of the layout that differ from the document.
 pub fn layout(backend: &dyn Backend) -> Result<f64> {
     let expected = expected(backend);
     let rig = Rig::new(backend, &expected.inside, &[])?;
@@ -150,7 +150,7 @@ pub fn layout(backend: &dyn Backend) -> Result<f64> {
     ]))
 }
 
-/// How far a reset is from the first keyframe.
+/// Distance between the state after a reset and the first keyframe.
 pub fn keyframe(backend: &dyn Backend) -> Result<f64> {
     let expected = expected(backend);
     let channels = state_channels(&expected.layout);

@@ -1,24 +1,23 @@
-//! Is an engine right? Checks of a backend against theory, and against the
-//! contract of [`asid_core::simulator`].
+//! Checks of a backend against theory and against the contract of [`asid_core::simulator`].
 //!
-//! A [`Check`] is a value: its name, the capability bits it needs, a function
-//! from a backend to one figure, the tolerance of that figure and the reason
-//! for the tolerance. A figure is a *deviation*: from a closed-form solution, or
-//! a count of broken promises, so that zero is perfect for every check. Running
-//! a check gives a [`Row`], and rows are all there is to read: what an engine
-//! does not claim is a row too, and so is what it is known to get wrong.
+//! A [`Check`] is a value: its name, the capability bits it needs, a function from a backend to one
+//! figure, the tolerance of that figure and the reason for the tolerance. A figure is a
+//! *deviation*: from a closed-form solution, or a count of broken promises. Zero is thus perfect
+//! for every check. Running a check gives a [`Row`]. A capability that an engine does not claim
+//! also gives a row, and so does a known deviation.
 //!
-//! Two rules keep the suite honest. A check looks at capability bits and never
-//! at an engine's name; what one engine is known to miss stands in the table
-//! `deviations.toml`, with the figure that is allowed and the reason. And a
-//! tolerance follows from the time step, the arithmetic or the softness that
-//! the scene asks for, not from what some engine happens to give.
+//! Two rules keep the suite honest.
+//!
+//! - A check looks at capability bits and never at an engine's name. Known deviations of an engine
+//!   are in the table `deviations.toml`, with the allowed figure and the reason.
+//! - A tolerance follows from the time step, the arithmetic or the softness that the scene asks
+//!   for. It does not follow from what some engine happens to give.
 //!
 //! # What a capability asks for
 //!
-//! A check needs exactly the capabilities that it names, and its scene has nothing
-//! that needs another: an engine that refuses whatever it does not claim passes
-//! all that is left. Beside the bits' own meaning (see [`Capabilities`]):
+//! A check needs exactly the capabilities that it names, and its scene needs no other. An engine
+//! that refuses whatever it does not claim therefore passes all remaining checks. The bits' own
+//! meaning is in [`Capabilities`]. In addition:
 //!
 //! | claimed | sensors and parts of a document that its checks use |
 //! |---|---|
@@ -32,13 +31,14 @@
 //! | `JOINT_ANCHORS` | `joint/…/pos`, `joint/…/axis`, `body/…/pos` |
 //! | `MASS_PARAMETERS` | `geom/…/pos`, `geom/…/mass`, `body/…/mass`, `ipos`, `inertia` |
 //!
-//! What an engine need not take, it may refuse and is not asked about: an inertia along
-//! other axes than the body's, further kinds of sensors, dampers on a free joint, masses as
-//! parameters that it does not claim. What it takes must be right. An engine that claims
-//! nothing that moves fails, and so does a claimed bit that no check can see without others.
+//! An engine may refuse what it need not accept, and is then not asked about it: an inertia along
+//! other axes than the body's, further kinds of sensors, dampers on a free joint, and masses as
+//! parameters that it does not claim. What it accepts must be right. An engine fails if it claims
+//! nothing that moves. It also fails if no check can test a claimed bit without bits that it does
+//! not claim.
 //!
-//! Snapshots, determinism, hostile calls, divergence and the rules of parameters are
-//! asked of every engine, in a scene made of what it claims.
+//! Snapshots, determinism, invalid calls, divergence and the rules of parameters are checked on
+//! every engine, in a scene made of what it claims.
 //!
 //! ```no_run
 //! # fn main() -> asid_core::Result<()> {
@@ -88,7 +88,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use asid_core::{Backend, Capabilities};
 
-/// Every check, family after family.
+/// All checks, family by family.
 pub fn checks() -> impl Iterator<Item = &'static Check> {
     [
         dynamics::CHECKS,
@@ -118,8 +118,8 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
     .flatten()
 }
 
-/// What the checks of a family are about, in the order of families: its name, which is
-/// the first part of its checks' names, and a sentence.
+/// The families in their order: the name, which is the first part of its checks' names, and a
+/// sentence.
 pub const FAMILIES: &[(&str, &str)] = &[
     (
         "dynamics",
@@ -180,17 +180,18 @@ pub fn run(backend: &dyn Backend) -> Vec<Row> {
     run_checks(backend, &all, 1, &|_| {})
 }
 
-/// What is told while checks run.
+/// Progress of a run of checks.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
     /// A check begins.
     Begins(&'a Check),
-    /// A check has its row.
+    /// A check has ended with this row.
     Ends(&'a Row),
 }
 
-/// Runs some checks on a backend, several at a time; `told` hears when each begins and ends.
-/// Rows are in the order of the checks, and do not depend on `threads`.
+/// Runs some checks on a backend, several at a time; calls `told` when each begins and ends.
+///
+/// The rows are in the order of the checks and do not depend on `threads`.
 pub fn run_checks(
     backend: &dyn Backend,
     checks: &[&Check],
@@ -223,7 +224,7 @@ pub fn run_checks(
         .collect()
 }
 
-/// What an engine must be able to do for anything to be asked of it: something moves.
+/// An engine must claim one of these for any motion to check.
 pub(crate) const MOVES: Capabilities = Capabilities::ARTICULATION.union(Capabilities::FREE_BODIES);
 
 #[cfg(test)]

@@ -1,5 +1,4 @@
-//! Batches, snapshots and models: how long they live, how large they get, and
-//! in which forms one and the same thing can be asked for.
+//! Batches, snapshots and models: lifetimes, sizes, and equivalent forms of one request.
 //!
 //! Every figure is a number of readings that differ in any bit, or of broken promises.
 
@@ -133,7 +132,7 @@ fn any_order(backend: &dyn Backend) -> Result<f64> {
         for rig in [&mut one, &mut two].into_iter().flatten() {
             different += differing_bits(&roll(rig, &[0], 20, 1)?, &expected);
         }
-        // The snapshot last, with nothing else of the scene left.
+        // The snapshot is dropped last, when nothing else of the scene is left.
         drop((two, one));
         different += f64::from(u8::from(snapshot.is_some_and(|s| s.rows() != 1)));
     }
@@ -161,7 +160,7 @@ fn without_parameters(backend: &dyn Backend) -> Result<f64> {
     let (mut rig, mut other) = (stirred(backend, 2, 1)?, stirred(backend, 2, 1)?);
     rig.set(&[-3.0, 0.0, -9.81, 0.0])?;
     other.set(&[-9.81, 0.0, -9.81, 0.0])?;
-    // The state of a simulation before anything acted on it, under other parameters.
+    // The state of a simulation on which nothing has acted yet, under other parameters.
     let snapshot = rig.simulator.save(&[0])?;
     rig.simulator.load(&snapshot, &[0], &[1])?;
     let state = other.simulator.save(&[0])?;
@@ -230,7 +229,7 @@ fn channels(backend: &dyn Backend) -> Result<f64> {
         .first()
         .copied()
         .ok_or_else(|| Error::Failed("the scene has no joint".into()))?;
-    // Twice the first, then all the others from the last on.
+    // The first name twice, then all others from the last.
     let mut order: Vec<&str> = names.iter().rev().copied().collect();
     order.insert(0, first);
     let (shuffled, alone) = (rows(&order)?, rows(&[first])?);

@@ -1,4 +1,4 @@
-//! Parameters of masses, joints and actuators, each by the amount that physics says.
+//! Parameters of masses, joints and actuators: each must change the motion by the physical amount.
 
 use asid_core::{Backend, Capabilities, Result};
 
@@ -137,7 +137,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A hinge about y under gravity with two small balls, let go with the arm level.
+/// A hinge about y under gravity with two small balls, released with the arm horizontal.
 fn arm(backend: &dyn Backend, parameter: (&str, f64)) -> Result<[f64; 2]> {
     let inside = r#"<worldbody><body name="arm"><joint name="j" axis="0 1 0"/>
       <geom name="near" type="sphere" size=".05" pos=".2 0 0" mass="1" contype="0" conaffinity="0"/>
@@ -147,13 +147,13 @@ fn arm(backend: &dyn Backend, parameter: (&str, f64)) -> Result<[f64; 2]> {
     Ok([rows[0][0] / STEP, rows[1][0] / STEP])
 }
 
-/// Acceleration of that arm with its far ball of mass `m` at `r`.
+/// Acceleration of this arm if its far ball has mass `m` and is at `r`.
 fn arm_theory(m: f64, r: f64) -> f64 {
     let near = 0.04 + 0.4 * 0.05 * 0.05;
     G * (0.2 + m * r) / (near + m * (r * r + 0.4 * 0.02 * 0.02))
 }
 
-/// A level bar whose hinge moves along it, turned by a right angle and then let go.
+/// A horizontal bar whose hinge is moved along it; it is rotated by a right angle, then released.
 fn joint_anchor(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<worldbody><body name="bar" pos="0 0 1"><joint name="j" axis="0 1 0"/>
       <geom type="sphere" size=".05" pos=".4 0 0" mass="1" contype="0" conaffinity="0"/></body></worldbody>
@@ -166,7 +166,7 @@ fn joint_anchor(backend: &dyn Backend) -> Result<f64> {
         [rows[0][0] / STEP, rows[1][0] / STEP],
         [fall(0.4), fall(0.3)],
     );
-    // The axis at x = 0.1 stays; the body's origin, 0.1 m behind it, goes up by that.
+    // The axis stays at x = 0.1. The body's origin lies 0.1 m behind it and rises by that distance.
     let quarter = std::f64::consts::FRAC_PI_2;
     rig.simulator.set_state(&[0, 1], &[quarter; 2], &[0.0; 2])?;
     let mut at = vec![0.0; 2 * rig.record.width()];
@@ -183,13 +183,13 @@ fn joint_axis(backend: &dyn Backend) -> Result<f64> {
     let mut rig = pair(backend, inside, &["qvel.j"], &[("joint/j/axis/2", 0.75)])?;
     let rows = rig.run(1, &[])?;
     let about = 0.4 * 0.4 + 0.4 * 0.05 * 0.05;
-    // Of the weight's torque, which is about y, the part along (0, 0.8, 0.6).
+    // The component of the weight's torque, which is about y, along (0, 0.8, 0.6).
     let wanted = [1.0, 0.8].map(|along| along * G * 0.4 / about);
     Ok(both([rows[0][0] / STEP, rows[1][0] / STEP], wanted))
 }
 
 fn body_place(backend: &dyn Backend) -> Result<f64> {
-    // The outer link turns about the vertical, which weight does not.
+    // The outer link rotates about the vertical, so its weight causes no torque.
     let inside = r#"<worldbody><body name="inner" pos="0 0 1"><joint name="j" axis="0 1 0"/>
       <geom type="sphere" size=".05" pos=".2 0 0" mass="1" contype="0" conaffinity="0"/>
       <body name="outer" pos=".4 0 0"><joint name="k" axis="0 0 1"/>
@@ -244,7 +244,7 @@ fn body_mass(backend: &dyn Backend) -> Result<f64> {
     ]))
 }
 
-/// A wheel on a hinge, with a centre of mass, a motor, and what acts on its joint.
+/// A wheel on a hinge with its centre of mass off the axis, a motor, and attributes of its joint.
 fn wheel(
     backend: &dyn Backend,
     joint: &str,
@@ -267,7 +267,7 @@ fn wheel(
 const INERTIA: f64 = 0.08 + 2.0 * 0.01;
 const MOTOR: &str = r#"<motor name="m" joint="j"/>"#;
 
-/// Rates after 20 steps under a unit torque, against those of two inertias.
+/// Compares rates after 20 steps under a unit torque with those of two inertias.
 fn inertia_is(backend: &dyn Backend, parameter: (&str, f64), inertia: f64) -> Result<f64> {
     let rows = wheel(backend, "", MOTOR, parameter, 20, 1.0)?;
     let time = 20.0 * STEP;
@@ -316,7 +316,7 @@ fn joint_stiffness(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn servo_gain(backend: &dyn Backend) -> Result<f64> {
-    // A spring of stiffness 2 pulls against the servo.
+    // A spring of stiffness 2 acts against the servo.
     let joint = r#"stiffness="2" damping="0.9""#;
     let servo = r#"<position name="p" joint="j" kp="8"/>"#;
     let rows = wheel(backend, joint, servo, ("actuator/p/kp", 18.0), 3000, 0.5)?;

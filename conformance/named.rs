@@ -1,10 +1,10 @@
-//! An engine as one check asks it: its scenes bear the check's name, and are kept.
+//! An engine as one check sees it: scenes carry the check's name and are kept.
 
 use std::sync::{Arc, Mutex};
 
 use asid_core::{Backend, Capabilities, Model, Result, Scene};
 
-/// An engine behind a wrapper that names what it loads.
+/// A wrapper around an engine that names the scenes it loads.
 pub struct Named<'a> {
     inner: &'a dyn Backend,
     check: &'static str,
@@ -12,7 +12,7 @@ pub struct Named<'a> {
 }
 
 impl<'a> Named<'a> {
-    /// The engine for a check.
+    /// Wraps an engine for a check.
     pub fn new(inner: &'a dyn Backend, check: &'static str) -> Self {
         Self {
             inner,
@@ -21,7 +21,7 @@ impl<'a> Named<'a> {
         }
     }
 
-    /// The documents that it was given, each once.
+    /// The documents that it has loaded, each once.
     pub fn scenes(self) -> Vec<String> {
         self.scenes.into_inner().unwrap_or_default()
     }

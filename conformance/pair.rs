@@ -4,7 +4,7 @@ use asid_core::{Backend, Result};
 
 use crate::rig::{Rig, Rows, Size, largest, last, relative};
 
-/// Two simulations, the first with nominal parameters and the second with others.
+/// Two simulations, the first with nominal parameters and the second with the given ones.
 pub fn pair(
     backend: &dyn Backend,
     inside: &str,
@@ -23,13 +23,13 @@ pub fn pair(
     Ok(rig)
 }
 
-/// Last row of both.
+/// Last row of each simulation.
 pub fn ends(rows: &Rows) -> Result<[Vec<f64>; 2]> {
     let half = rows.len() / 2;
     Ok([last(&rows[..half])?.to_vec(), last(&rows[half..])?.to_vec()])
 }
 
-/// Largest deviation of both from theory.
+/// Largest relative deviation of the two from theory.
 pub fn both(found: [f64; 2], theory: [f64; 2]) -> f64 {
     largest((0..2).map(|i| relative(found[i], theory[i])))
 }

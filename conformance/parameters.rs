@@ -1,5 +1,4 @@
-//! Rules of parameters: nominal values, whose they are, when they change, what
-//! is refused.
+//! Rules of parameters: nominal values, separate values per simulation, changes, and refusals.
 
 use asid_core::simulator::ParameterChange;
 use asid_core::{Backend, Capabilities, Result};

@@ -1,24 +1,24 @@
-//! Parts of a document that an engine refuses or follows, each with and without it.
+//! Parts of a document that an engine must refuse or follow, each with and without it.
 
 use asid_core::Capabilities;
 
 use crate::subject::GHOST;
 
-/// A part of a document: with it and without it.
+/// A document with and without one part.
 pub struct Part {
-    /// What it is, for a reader of the report.
+    /// Description of the part, for a reader of the report.
     pub name: String,
-    /// What is read.
+    /// Channel that is read.
     pub channel: &'static str,
-    /// Positions and velocities to begin with; those of the document where there are none.
+    /// Initial positions and velocities; `None` stands for those of the document.
     pub state: Option<(Vec<f64>, Vec<f64>)>,
-    /// The document with it.
+    /// The document with the part.
     pub with: String,
-    /// The document without it.
+    /// The document without the part.
     pub without: String,
 }
 
-/// The parts that can be seen on what an engine claims to move.
+/// The parts whose effect is visible on what an engine claims to move.
 pub fn parts(capabilities: Capabilities) -> Vec<Part> {
     let mut parts = Vec::new();
     if capabilities.contains(Capabilities::ARTICULATION) {
@@ -61,7 +61,7 @@ pub fn parts(capabilities: Capabilities) -> Vec<Part> {
 const WELD: &str = r#"<equality><weld body1="b"/></equality>"#;
 const CONNECT: &str = r#"<equality><connect body1="b" anchor="0 0 0"/></equality>"#;
 
-/// A wheel, turning at 2 rad/s, with something on its joint or beside it.
+/// A wheel that turns at 2 rad/s, with an attribute of its joint or an element beside it.
 fn wheel(name: &str, joint: &str, beside: &str) -> Part {
     let document = |joint: &str, beside: &str| {
         format!(
@@ -69,7 +69,7 @@ fn wheel(name: &str, joint: &str, beside: &str) -> Part {
             <inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>{beside}"#
         )
     };
-    // What else stands beside the part is there without it as well.
+    // Other attributes beside the part are present without it as well.
     let rest = joint.split_once(' ').map_or("", |(_, rest)| rest);
     Part {
         name: name.to_owned(),
@@ -80,7 +80,7 @@ fn wheel(name: &str, joint: &str, beside: &str) -> Part {
     }
 }
 
-/// A body that falls and tumbles, with something on its free joint or beside it.
+/// A body that falls and tumbles, with an attribute of its free joint or an element beside it.
 fn stone(name: &str, joint: &str, beside: &str) -> Part {
     let document = |joint: &str, beside: &str| {
         format!(
@@ -100,7 +100,7 @@ fn stone(name: &str, joint: &str, beside: &str) -> Part {
     }
 }
 
-/// A body that falls, through the air, onto the floor or held by something.
+/// A body that falls: through a medium, onto the floor, or held by something.
 fn falls(whose: &str, joint: &str, state: (Vec<f64>, Vec<f64>)) -> Vec<Part> {
     let document = |option: &str, body: &str, geom: &str, floor: &str, beside: &str| {
         format!(
@@ -117,7 +117,7 @@ fn falls(whose: &str, joint: &str, state: (Vec<f64>, Vec<f64>)) -> Vec<Part> {
         with: document(option, body, &ghost, "", beside),
         without: document("", "", &ghost, "", ""),
     };
-    // It lands on the floor from 5 mm.
+    // It falls onto the floor from a height of 5 mm.
     let mut low = state.clone();
     low.1.fill(0.0);
     let height = if low.0.len() > 1 { 2 } else { 0 };

@@ -1,4 +1,4 @@
-//! A scene, a batch and its readings in few words, for the checks.
+//! Helpers of the checks: a scene, a batch and its readings in few words.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use asid_core::{
     Simulator, Target,
 };
 
-/// Standard gravity as the scenes have it, m/s².
+/// Standard gravity of the scenes, m/s².
 pub const G: f64 = 9.81;
 
-/// Physics time step of the scenes, s, where they say nothing else.
+/// Physics time step of the scenes, s, unless they set another.
 pub const STEP: f64 = 0.002;
 
-/// A document with this inside: radians, steps of [`STEP`].
+/// A scene with this content, in radians and with steps of [`STEP`].
 ///
 /// # Errors
-/// When it is no MJCF.
+/// If it is no MJCF.
 pub fn scene(inside: &str) -> Result<Scene> {
     let xml = format!(
         "<mujoco><compiler angle=\"radian\"/><option timestep=\"{STEP}\"/>{inside}</mujoco>"
@@ -25,14 +25,14 @@ pub fn scene(inside: &str) -> Result<Scene> {
     Scene::from_xml("conformance", &xml, &[])
 }
 
-/// What a rig is made of besides its scene.
+/// The make-up of a rig besides its scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Size<'a> {
-    /// Simulations.
+    /// Number of simulations.
     pub sims: usize,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
-    /// Parameters.
+    /// Targets of the parameters.
     pub targets: &'a [&'a str],
 }
 
@@ -43,32 +43,32 @@ pub const ONE: Size<'static> = Size {
     targets: &[],
 };
 
-/// A batch with channels to record.
+/// A batch with recorded channels.
 pub struct Rig {
     /// The compiled scene.
     pub model: Arc<dyn Model>,
     /// The batch.
     pub simulator: Box<dyn Simulator>,
-    /// What is recorded.
+    /// The recorded channels.
     pub record: Recording,
 }
 
-/// Recorded rows, simulation after simulation, frame after frame.
+/// Recorded rows, by simulation, then by frame.
 pub type Rows = Vec<Vec<f64>>;
 
 impl Rig {
-    /// One simulation of a document with this inside.
+    /// One simulation of a document with this content.
     ///
     /// # Errors
-    /// When the engine refuses the scene or a channel.
+    /// If the engine refuses the scene or a channel.
     pub fn new(backend: &dyn Backend, inside: &str, channels: &[&str]) -> Result<Self> {
         Self::with(backend, inside, channels, ONE)
     }
 
-    /// A batch of a document with this inside.
+    /// A batch of a document with this content.
     ///
     /// # Errors
-    /// When the engine refuses the scene, a channel or a target.
+    /// If the engine refuses the scene, a channel or a target.
     pub fn with(
         backend: &dyn Backend,
         inside: &str,
@@ -81,7 +81,7 @@ impl Rig {
     /// A batch of a compiled scene.
     ///
     /// # Errors
-    /// When the engine refuses a channel or a target.
+    /// If the engine refuses a channel or a target.
     pub fn of(model: Arc<dyn Model>, channels: &[&str], size: Size<'_>) -> Result<Self> {
         let targets: Result<Vec<Target>> = size.targets.iter().map(|t| t.parse()).collect();
         let simulator = model.simulator(&BatchConfig {
@@ -119,31 +119,31 @@ impl Rig {
         vec![value; self.simulator.layout().nu()]
     }
 
-    /// Every simulation's number.
+    /// Numbers of all simulations.
     pub fn all(&self) -> Vec<usize> {
         (0..self.simulator.batch_size()).collect()
     }
 
-    /// Puts every simulation into one state.
+    /// Sets every simulation to the same state.
     ///
     /// # Errors
-    /// When a length does not fit.
+    /// If a length does not fit.
     pub fn place(&mut self, qpos: &[f64], qvel: &[f64]) -> Result<()> {
         let sims = self.all();
         self.simulator
             .set_state(&sims, &qpos.repeat(sims.len()), &qvel.repeat(sims.len()))
     }
 
-    /// Sets the parameters of every simulation, row after row.
+    /// Sets the parameters of every simulation, row by row.
     ///
     /// # Errors
-    /// When a length or a value does not fit.
+    /// If a length or a value does not fit.
     pub fn set(&mut self, values: &[f64]) -> Result<()> {
         let sims = self.all();
         self.simulator.set_parameters(&sims, values)
     }
 
-    /// Frames of one physics step each under one constant command.
+    /// Runs frames of one physics step each under one constant command.
     ///
     /// # Errors
     /// As [`Simulator::rollout`].
@@ -151,8 +151,8 @@ impl Rig {
         self.run_with(frames, 1, ctrl, |_| {})
     }
 
-    /// Frames under one constant command, with forces, changes, a hook or other
-    /// simulations as `change` sets them.
+    /// Runs frames under one constant command; `change` sets forces, changes, a hook or other
+    /// simulations.
     ///
     /// # Errors
     /// As [`Simulator::rollout`].
@@ -187,7 +187,7 @@ impl Rig {
         Ok(out.chunks(width.max(1)).map(<[f64]>::to_vec).collect())
     }
 
-    /// The present state of every simulation.
+    /// Reads the present state of every simulation.
     ///
     /// # Errors
     /// As [`Simulator::read`].
@@ -200,10 +200,10 @@ impl Rig {
     }
 }
 
-/// What a rollout may have besides commands.
+/// Inputs of a rollout besides commands.
 #[derive(Default)]
 pub struct Extras<'a> {
-    /// Simulations, all by default.
+    /// Numbers of the simulations, all by default.
     pub sims: Vec<usize>,
     /// External forces.
     pub forces: Vec<ExternalForce<'a>>,
@@ -213,7 +213,7 @@ pub struct Extras<'a> {
     pub hook: Option<&'a dyn StepHook>,
 }
 
-/// Names of the channels of a whole state: `qpos` of each joint, then `qvel` of each.
+/// Names of the channels of a complete state: `qpos` of each joint, then `qvel` of each.
 pub fn state_channels(layout: &Layout) -> Vec<String> {
     let of = |kind: &'static str| {
         let joints = layout.joints.iter();
@@ -225,19 +225,19 @@ pub fn state_channels(layout: &Layout) -> Vec<String> {
 /// The last row.
 ///
 /// # Errors
-/// When there is none.
+/// If there is none.
 pub fn last(rows: &[Vec<f64>]) -> Result<&[f64]> {
     rows.last()
         .map(Vec::as_slice)
         .ok_or_else(|| Error::Failed("nothing was recorded".into()))
 }
 
-/// How far `value` is from `theory`, as a part of `theory`.
+/// Relative deviation of `value` from `theory`.
 pub fn relative(value: f64, theory: f64) -> f64 {
     value / theory - 1.0
 }
 
-/// The largest magnitude; NaN where any is NaN.
+/// The largest magnitude; NaN if any value is NaN.
 pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |worst: f64, value| {
         if worst.is_nan() || value.is_nan() {
@@ -260,12 +260,12 @@ pub fn differing_bits(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     (lengths + unequal) as f64
 }
 
-/// Number of promises that are broken.
+/// Number of broken promises.
 pub fn broken<const N: usize>(promises: [bool; N]) -> f64 {
     promises.iter().filter(|kept| !**kept).count() as f64
 }
 
-/// Mean time between upward passes through `level`, s, for samples a step apart.
+/// Mean time between upward crossings of `level`, s, for samples one step apart.
 pub fn period(samples: &[f64], level: f64) -> f64 {
     let crossings: Vec<f64> = samples
         .windows(2)

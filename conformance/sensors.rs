@@ -1,7 +1,7 @@
-//! Every kind of sensor that an engine takes, on a frame that is turned and moves.
+//! Every kind of sensor that an engine accepts, on a frame that is rotated and moves.
 //!
-//! A kind that is refused is not asked about. One that is taken must read in the frame
-//! that MJCF says: `frame...` in the world, `gyro` and `velocimeter` in the site's own.
+//! A kind that the engine refuses is not checked. An accepted kind must read in MJCF's frame:
+//! `frame...` in the world, `gyro` and `velocimeter` in the site's own.
 
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -30,7 +30,8 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A frame in the world and how it moves: velocity of its origin and rate in the world.
+/// A frame in the world and its motion: velocity of its origin and angular velocity, both in the
+/// world.
 struct Moving {
     place: Vector3<f64>,
     attitude: UnitQuaternion<f64>,
@@ -39,7 +40,7 @@ struct Moving {
 }
 
 impl Moving {
-    /// A frame that is fixed in this one.
+    /// A frame that is fixed to this one.
     fn fixed(&self, place: Vector3<f64>, attitude: UnitQuaternion<f64>) -> Self {
         let arm = self.attitude * place;
         Self {
@@ -50,7 +51,7 @@ impl Moving {
         }
     }
 
-    /// What a sensor of a kind reads.
+    /// Expected reading of a sensor of this kind.
     fn reads(&self, kind: &str) -> Vec<f64> {
         let q = self.attitude;
         let own = |v: Vector3<f64>| q.inverse() * v;
@@ -83,8 +84,10 @@ fn turn(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
-/// Readings of all kinds that are taken against those of a body that moves so, in a
-/// document with this before and this after the sensors.
+/// Readings of all accepted kinds of sensors, with the expected ones, on a body that moves in this
+/// way.
+///
+/// The document has this text before and after the sensors.
 fn readings(
     backend: &dyn Backend,
     joint: &str,
@@ -92,7 +95,7 @@ fn readings(
     state: (&[f64], &[f64]),
     body: &Moving,
 ) -> Result<Option<f64>> {
-    // First with an inertia that is turned; an engine may refuse that.
+    // Try a rotated inertia first; an engine may refuse it.
     let ways = [
         (r#" quat="0.6 0 0 0.8""#, turn(0.6, 0.0, 0.0, 0.8)),
         ("", UnitQuaternion::identity()),

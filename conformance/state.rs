@@ -1,4 +1,4 @@
-//! States: saved, restored, copied and set; and what results may depend on.
+//! States: saving, restoring, copying and setting them; and what results may depend on.
 //!
 //! Every figure here is a number of readings that differ in any bit.
 
@@ -9,7 +9,7 @@ use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, Rows, broken, differing_bits};
 use crate::subject::{batch, command, elsewhere, roll, stir, stirred};
 
-/// What every engine has to do.
+/// No capability: every engine must pass the check.
 const ANY: Capabilities = Capabilities::empty();
 const EXACT: Capabilities = Capabilities::EXACT_SNAPSHOT;
 const NONE: Tolerance = Tolerance::same(0.0);
@@ -56,7 +56,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A batch of three in the middle of its motion, and a snapshot of then.
+/// A batch of three in the middle of its motion, and a snapshot of that moment.
 fn midway(backend: &dyn Backend) -> Result<(Rig, Snapshot)> {
     let mut rig = stirred(backend, 3, 1)?;
     roll(&mut rig, &[0, 1, 2], 60, 2)?;
@@ -154,7 +154,7 @@ fn fresh(backend: &dyn Backend) -> Result<f64> {
     Ok(differing_bits(&first, &second))
 }
 
-/// Two batches that run at the same time share nothing.
+/// Two batches that run at the same time must not share anything.
 fn parallel(backend: &dyn Backend) -> Result<f64> {
     let (mut one, mut two) = (stirred(backend, 2, 1)?, stirred(backend, 2, 1)?);
     let alone = roll(&mut stirred(backend, 2, 1)?, &[0, 1], 100, 2)?;
@@ -188,7 +188,7 @@ fn joined(backend: &dyn Backend) -> Result<f64> {
     let mut rig = stirred(backend, 1, 1)?;
     let mut parts = roll(&mut rig, &[0], 30, 2)?;
     parts.extend(roll(&mut rig, &[0], 50, 2)?);
-    // The last row is also what a reading of the present gives.
+    // A reading of the present state must equal the last row.
     parts.extend(rig.read()?);
     let mut expected = whole;
     expected.extend(expected.last().cloned());

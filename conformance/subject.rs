@@ -1,30 +1,29 @@
-//! A scene that moves, made of what an engine claims and of nothing else.
+//! A moving scene made of what an engine claims and of nothing else.
 //!
-//! Snapshots, determinism, hostile calls and the rules of parameters hold for
-//! every engine, so their checks run on every engine: a pile of bodies that an
-//! arm pushes where all of that is claimed, a mechanism alone where there is no
-//! contact, tumbling bodies where there are no joints.
+//! Snapshots, determinism, invalid calls and the rules of parameters must hold for every engine, so
+//! their checks run on every engine. If the engine claims all of it, the scene is a pile of bodies
+//! that an arm pushes. Without contact it is a mechanism alone, without joints tumbling bodies.
 
 use asid_core::layout::JointKind;
 use asid_core::{Backend, Capabilities, Control, Layout, Result, Rollout};
 
 use crate::rig::{Rig, Rows, Size};
 
-/// The document and what is recorded of it.
+/// The document and its recorded channels.
 pub struct Subject {
-    /// Inside of the document, for [`crate::rig::scene`].
+    /// Content of the document, for [`crate::rig::scene`].
     pub inside: String,
     /// `qpos` and `qvel` of every joint.
     pub channels: Vec<&'static str>,
 }
 
-/// Columns that every engine can set: gravity along z and x.
+/// Parameters that every engine can set: gravity along z and x.
 pub const TARGETS: [&str; 2] = ["option/gravity/2", "option/gravity/0"];
 
 /// Nominal values of [`TARGETS`].
 pub const NOMINAL: [f64; 2] = [-9.81, 0.0];
 
-/// What geoms need so that they touch nothing.
+/// Attributes of geoms that touch nothing.
 pub const GHOST: &str = r#" contype="0" conaffinity="0""#;
 
 /// The scene for an engine.
@@ -95,8 +94,9 @@ pub fn subject(backend: &dyn Backend) -> Subject {
     }
 }
 
-/// The scene for an engine that claims no motion: a cart on a rail if it takes one, else
-/// a body that nothing moves.
+/// The scene for an engine that claims no motion.
+///
+/// It is a cart on a rail if the engine accepts one, else a body that nothing moves.
 fn unclaimed(backend: &dyn Backend) -> Subject {
     let body = |joint: &str| {
         format!(
@@ -118,7 +118,7 @@ fn unclaimed(backend: &dyn Backend) -> Subject {
     }
 }
 
-/// A batch of the scene, with [`TARGETS`] as its parameters.
+/// A batch of the scene with [`TARGETS`] as its parameters.
 pub fn batch(backend: &dyn Backend, sims: usize, threads: usize) -> Result<Rig> {
     let subject = subject(backend);
     let size = Size {
@@ -129,14 +129,14 @@ pub fn batch(backend: &dyn Backend, sims: usize, threads: usize) -> Result<Rig> 
     Rig::with(backend, &subject.inside, &subject.channels, size)
 }
 
-/// A batch of the scene whose simulations move differently, each by its number.
+/// A batch of the scene whose simulations move differently, by their numbers.
 pub fn stirred(backend: &dyn Backend, sims: usize, threads: usize) -> Result<Rig> {
     let mut rig = batch(backend, sims, threads)?;
     stir(&mut rig, &(0..sims).collect::<Vec<_>>())?;
     Ok(rig)
 }
 
-/// Gives every simulation the velocities of a number, in the scene's start positions.
+/// Gives each simulation the velocities of its number, at the scene's initial positions.
 pub fn stir(rig: &mut Rig, numbers: &[usize]) -> Result<()> {
     let nv = rig.simulator.layout().nv;
     let qvel: Vec<f64> = numbers
@@ -149,7 +149,7 @@ pub fn stir(rig: &mut Rig, numbers: &[usize]) -> Result<()> {
     rig.simulator.set_state(&sims, &qpos, &qvel)
 }
 
-/// The positions that the document says.
+/// The initial positions of the document.
 fn start(rig: &Rig) -> Result<Vec<f64>> {
     let names: Vec<String> = (rig.simulator.layout().joints.iter())
         .map(|joint| format!("qpos.{}", joint.name))
@@ -161,7 +161,7 @@ fn start(rig: &Rig) -> Result<Vec<f64>> {
     Ok(qpos)
 }
 
-/// A state that is neither the start nor one that the scene would come to by itself.
+/// A state that is neither the initial one nor one that the scene would reach by itself.
 pub fn elsewhere(layout: &Layout) -> (Vec<f64>, Vec<f64>) {
     let mut qpos = Vec::with_capacity(layout.nq);
     for (i, joint) in layout.joints.iter().enumerate() {
@@ -178,7 +178,7 @@ pub fn elsewhere(layout: &Layout) -> (Vec<f64>, Vec<f64>) {
     (qpos, qvel)
 }
 
-/// Rolls some simulations, each under its own command, that of its number.
+/// Rolls out some simulations, each under the command of its number.
 pub fn roll(rig: &mut Rig, sims: &[usize], frames: usize, substeps: usize) -> Result<Rows> {
     let nu = rig.simulator.layout().nu();
     let control: Vec<f64> = sims
@@ -198,21 +198,21 @@ pub fn command(sim: usize) -> f64 {
     0.4 + 0.3 * sim as f64
 }
 
-/// A body of 1 kg that nothing holds: on a free joint, or on three slides.
+/// A body of 1 kg that nothing holds: on a free joint or on three slides.
 pub struct Falling {
-    /// Inside of the document.
+    /// Content of the document.
     pub inside: &'static str,
     /// Its name in the document.
     pub body: &'static str,
-    /// Three velocities, and what else the joint has.
+    /// Channels of its velocity: three linear ones, then the others of the joint.
     pub velocity: &'static [&'static str],
-    /// The origin, as a row of positions.
+    /// Position at the origin, as a row of positions.
     pub origin: &'static [f64],
-    /// Standing still, as a row of velocities.
+    /// State at rest, as a row of velocities.
     pub rest: &'static [f64],
 }
 
-/// Such a body for an engine.
+/// Returns such a body for an engine.
 pub fn falling(backend: &dyn Backend) -> Falling {
     if backend.capabilities().contains(Capabilities::FREE_BODIES) {
         Falling {
