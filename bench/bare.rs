@@ -1,19 +1,19 @@
-//! The contract of the engines' own bare loops: what a person would write who has only the engine.
+//! The contract of the engines' own bare loops: what a user would write with the engine alone.
 
 use anyhow::Result;
 
-/// Simulations that are stepped in plain loops, one after the other on each thread.
+/// Simulations that run in plain loops, one after the other on each thread.
 pub trait Bare {
-    /// Puts every simulation at its start. Not part of what is measured.
+    /// Resets every simulation to its initial state; not part of the measured time.
     ///
     /// # Errors
-    /// When the engine refuses a state.
+    /// If the engine refuses a state.
     fn rewind(&mut self) -> Result<()>;
 
-    /// Runs all of them once, spread evenly over `threads`.
+    /// Runs all simulations once, spread evenly over `threads`.
     fn run(&mut self, threads: usize);
 
-    /// Positions of simulation `i`, `nq`.
+    /// Positions of simulation `i`, `nq` values.
     #[cfg(test)]
     fn qpos(&self, i: usize) -> Vec<f64>;
 }

@@ -1,11 +1,11 @@
-//! Lets this crate's programs and tests find libmujoco and libtorch when they run.
+//! Lets this crate's programs and tests find libmujoco and libtorch at run time.
 //!
-//! The crates that link them do so from the folders that two variables name, but link
-//! arguments do not travel to dependent crates; the rpath is set here for this
-//! package and by the root package for the `asid` binary. Without the variables
-//! the loader's own search path decides.
+//! The crates that link the libraries take them from the folders that two variables name, but cargo
+//! does not pass their link arguments on to dependent crates. This script therefore sets the rpath
+//! for this package; the root package sets it for the `asid` binary. Without the variables the
+//! loader's own search path decides.
 
-// A build script speaks to cargo through its standard output.
+// A build script talks to cargo through its standard output.
 #![allow(clippy::print_stdout)]
 
 use std::env;
@@ -19,7 +19,7 @@ fn main() {
     }
 }
 
-/// Adds the folder `below` of what `variable` names to the run-time search path.
+/// Adds the subfolder `below` of the folder that `variable` names to the run-time search path.
 fn rpath(variable: &str, below: &str) {
     println!("cargo:rerun-if-env-changed={variable}");
     let Some(value) = env::var_os(variable).filter(|v| !v.is_empty()) else {

@@ -5,23 +5,23 @@ use std::time::Instant;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// Seconds that something took.
+/// Time that some work took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
-    /// By the clock on the wall.
+    /// Wall-clock time, s.
     pub wall_s: f64,
-    /// Of all threads of this process, on their cores.
+    /// CPU time of all threads of this process, s.
     pub cpu_s: f64,
 }
 
 impl Cost {
-    /// What no work undercuts: the start of a search for the least.
+    /// Infinite cost: the start of a search for a minimum.
     pub const ENDLESS: Self = Self {
         wall_s: f64::INFINITY,
         cpu_s: f64::INFINITY,
     };
 
-    /// The lesser of both times; other load on the machine only adds.
+    /// The smaller value of each time; other load on the machine only adds time.
     pub fn least(self, other: Self) -> Self {
         Self {
             wall_s: self.wall_s.min(other.wall_s),
@@ -37,7 +37,7 @@ impl AddAssign for Cost {
     }
 }
 
-/// Does `work` and tells what it took.
+/// Runs `work`; returns its result and its cost.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     let (start, cpu) = (Instant::now(), cpu_s());
     let out = work();
@@ -48,7 +48,7 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Cost) {
     (out, cost)
 }
 
-/// CPU time that this process has taken, s.
+/// CPU time that this process has used, s.
 fn cpu_s() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64

@@ -1,4 +1,5 @@
-//! What a diagnosis costs, against joints and rows: arms of servos that lack nothing, and that lack friction at one joint.
+//! Cost of a diagnosis by joints and rows: arms with servos that lack nothing, and arms that lack
+//! friction at one joint.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,17 +12,19 @@ use asid_core::{Backend, Control, Rollout, Scene, Streams};
 use rand::Rng as _;
 use serde::Serialize;
 
-/// Joints of an arm, and rows of all its training logs at 100 Hz: the last are a minute of an arm of seven.
+/// Joints of an arm, and rows of all its training logs at 100 Hz; the last is one minute of an arm
+/// with seven joints.
 const SIZES: [(usize, usize); 6] = [(1, 600), (1, 6000), (2, 600), (4, 600), (7, 600), (7, 6000)];
-/// Training logs, and those held out.
+/// Numbers of training logs and of held-out logs.
 const LOGS: [usize; 2] = [3, 1];
-/// Row of a log, s, and physics steps in it.
+/// Time between the rows of a log, s; the next constant is the number of physics steps in it.
 const ROW: f64 = 0.01;
 const SUBSTEPS: usize = 5;
-/// Damping of each joint of the model and friction that the first one of the real arm has besides, N m s/rad.
+/// Damping of each joint of the model, and extra friction of the first joint of the real arm, N m
+/// s/rad.
 const DAMPING: f64 = 0.05;
 const FRICTION: f64 = 0.2;
-/// Deviation of the angle sensors, rad.
+/// Standard deviation of the angle sensors' noise, rad.
 const NOISE: f64 = 5e-4;
 
 /// Cost of one diagnosis.
@@ -31,15 +34,16 @@ pub struct DiagnosisRow {
     joints: usize,
     rows: usize,
     lacks: &'static str,
-    /// Effects at a site that a screening weighed.
+    /// Effects at sites that a screening compared.
     candidates: usize,
-    /// What was named.
+    /// The named effects.
     named: String,
     first_table_s: f64,
     wall_s: f64,
 }
 
-/// An arm of rods in a row, a servo at each joint; axes across the rod and along it in turns.
+/// An arm of rods in a row with a servo at each joint; the axes alternate between across and along
+/// the rod.
 fn arm(joints: usize, friction: f64) -> String {
     let (mut bodies, mut drives, mut sensors) = (String::new(), String::new(), String::new());
     for j in 0..joints {
@@ -65,7 +69,7 @@ fn arm(joints: usize, friction: f64) -> String {
     )
 }
 
-/// A log of an arm that follows sums of two sines, from rest.
+/// A log of an arm that follows sums of two sines from rest.
 fn log(
     engine: &dyn Backend,
     document: &str,
@@ -117,7 +121,7 @@ fn log(
             let _ = write!(text, ",{}", control[k * joints + j]);
         }
         for j in 0..joints {
-            // A row is read before its command acts.
+            // The reading of a row precedes the action of its command.
             let angle = if k == 0 {
                 0.0
             } else {
@@ -155,7 +159,7 @@ fn write_study(
 /// Diagnoses arms of several sizes.
 ///
 /// # Errors
-/// When the engine or the program fails.
+/// If the engine or the program fails.
 pub fn rows(asid: &Path, name: &str, engine: &dyn Backend) -> Result<Vec<DiagnosisRow>> {
     let mut out = Vec::new();
     for size in SIZES {
@@ -203,7 +207,7 @@ pub fn rows(asid: &Path, name: &str, engine: &dyn Backend) -> Result<Vec<Diagnos
     Ok(out)
 }
 
-/// Diagnoses as a table.
+/// The diagnoses as a table.
 pub fn table(rows: &[DiagnosisRow]) -> Vec<Vec<String>> {
     rows.iter()
         .map(|r| {

@@ -1,10 +1,10 @@
-//! Environment steps a second of Fisher exploration with one unknown, and how
-//! much of its CPU time the engine's own stepping takes.
+//! Environment steps per second of Fisher exploration with one unknown, and the engine's share of
+//! its CPU time.
 //!
-//! The share is CPU time of the bare loop by that of the Fisher rollout, over the
-//! same number of physics steps with the same parameters, starts and commands.
-//! In the one-step form the copies take the episode's state every control step,
-//! which the bare loop does not do: its states drift a little from theirs.
+//! The share is the CPU time of the bare loop divided by that of the Fisher rollout. Both take the
+//! same number of physics steps with the same parameters, initial states and commands. In the
+//! one-step form the copies take the episode's state at every control step. The bare loop does not
+//! do this, so its states drift slightly from theirs.
 
 use std::sync::atomic::AtomicU64;
 
@@ -24,7 +24,7 @@ const EPISODES: usize = 64;
 /// Both forms of the derivative.
 const FORMS: [Form; 2] = [Form::OneStep, Form::Trajectory];
 
-/// One engine, form and number of threads.
+/// Measurement for one engine, form and number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct FisherRow {
     engine: String,
@@ -32,9 +32,9 @@ pub struct FisherRow {
     episodes: usize,
     threads: usize,
     rounds: usize,
-    /// Control steps of all episodes a second, best of the rounds.
+    /// Control steps of all episodes per second, best of the rounds.
     env_steps_per_s: f64,
-    /// Physics steps of all copies a second.
+    /// Physics steps of all copies per second.
     physics_steps_per_s: f64,
     /// Share of the CPU time that the engine's own stepping takes, on one thread.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,7 +44,7 @@ pub struct FisherRow {
 /// All rows of one engine.
 ///
 /// # Errors
-/// When the engine fails.
+/// If the engine fails.
 pub fn rows(
     backend: &dyn Backend,
     task: &dyn Task,
@@ -72,7 +72,7 @@ pub fn rows(
         nuisance: false,
         ..FisherSettings::default()
     });
-    // Both forms have the same simulations.
+    // Both forms run the same simulations.
     let (theta, copies) = copies(&parameters, settings[0].delta, &episodes.theta);
     let work = Workload::new(task, model.layout(), &parameters, &episodes, &theta, copies)?;
     let mut loops = bare(backend.name(), task.scene(), &work)?;
@@ -111,7 +111,7 @@ pub fn rows(
     Ok(out)
 }
 
-/// Runs the episodes of a batch from their start to their end.
+/// Runs the episodes of a batch from start to end.
 fn explore(batch: &mut FisherBatch<'_>, episodes: &Episodes) -> Result<()> {
     let mut readings = vec![0.0; batch.episodes() * batch.width()];
     let mut reward = vec![0.0; batch.episodes()];
@@ -122,8 +122,9 @@ fn explore(batch: &mut FisherBatch<'_>, episodes: &Episodes) -> Result<()> {
     Ok(())
 }
 
-/// Unknowns of every simulation of a Fisher batch: each episode, then a copy up
-/// and one down for each unknown. Also the number of simulations an episode.
+/// Unknowns of every simulation of a Fisher batch, and the number of simulations per episode.
+///
+/// Each episode is followed by one copy with a higher and one with a lower value of each unknown.
 fn copies(parameters: &[Parameter], delta: f64, theta: &[f64]) -> (Vec<f64>, usize) {
     let d = parameters.len();
     let bound = Parameter::scaled_bound();

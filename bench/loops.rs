@@ -1,4 +1,4 @@
-//! The bare loops by the engine's name.
+//! Selects the bare loop by the engine's name.
 
 use anyhow::Result;
 use asid_core::Scene;
@@ -10,7 +10,7 @@ use crate::workload::Workload;
 /// The bare loop of an engine.
 ///
 /// # Errors
-/// When the engine has none here or refuses the scene.
+/// If there is no loop for the engine, or if it refuses the scene.
 pub fn bare<'a>(engine: &str, scene: &Scene, work: &'a Workload) -> Result<Box<dyn Bare + 'a>> {
     match engine {
         "rapier" => Ok(Box::new(Rapier::new(scene, work)?)),
@@ -28,9 +28,10 @@ mod tests {
     use super::*;
     use crate::workload::Episodes;
 
-    /// Comparing speeds means something only where both sides do the same: after
-    /// two seconds of pushing the arm is where it is in a batch. A push that
-    /// differs in the last digits moves it by less than a servo's play, 5 mrad.
+    /// Speeds can be compared only if both sides do the same work.
+    ///
+    /// After two seconds of pushing, the arm must be where it is in a batch. A push that differs in
+    /// the last digits moves it by less than a servo's play, 5 mrad.
     #[test]
     fn the_bare_loop_moves_the_arm_as_a_batch_does() {
         let task = (find::<TaskEntry>(crate::TASK).unwrap().make)().unwrap();

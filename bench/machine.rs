@@ -1,4 +1,4 @@
-//! What was measured, where and when: without it a number means nothing.
+//! Circumstances of a measurement: what, where and when. Without them a number means nothing.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +15,7 @@ pub struct Circumstances {
     pub command: String,
     /// UTC, as in ISO 8601.
     pub date: String,
-    /// Commit, with `+changes` where the tree differs from it.
+    /// Commit, with `+changes` if the working tree differs from it.
     pub git: String,
     /// Model of the CPU.
     pub cpu: String,
@@ -23,14 +23,14 @@ pub struct Circumstances {
     pub cores: usize,
     /// Operating system and architecture.
     pub system: String,
-    /// Processes that ran or waited when the measurement began, mean over a minute.
+    /// Mean number of running or waiting processes over the minute before the measurement.
     pub load: Option<f64>,
     /// Versions by name.
     pub versions: BTreeMap<String, String>,
 }
 
 impl Circumstances {
-    /// Those of this moment; `versions` are the engines'.
+    /// The present circumstances; `engines` are names and versions of the engines.
     pub fn now(command: String, engines: &[(String, String)]) -> Self {
         let mut versions: BTreeMap<String, String> = engines.iter().cloned().collect();
         versions.insert("asid".into(), env!("CARGO_PKG_VERSION").into());
@@ -49,7 +49,7 @@ impl Circumstances {
         }
     }
 
-    /// One line for people.
+    /// One sentence for readers.
     pub fn sentence(&self) -> String {
         let versions: Vec<String> = self
             .versions
@@ -111,7 +111,7 @@ fn load() -> Option<f64> {
     text.split(' ').next()?.parse().ok()
 }
 
-/// Now, UTC, to the second.
+/// The present time, UTC, to the second.
 fn date() -> String {
     let seconds = SystemTime::now()
         .duration_since(UNIX_EPOCH)
@@ -121,8 +121,8 @@ fn date() -> String {
     format!("{year}-{month:02}-{day:02}T{h:02}:{m:02}:{s:02}Z")
 }
 
-/// Year, month and day of a number of days since 1970 (Hinnant, "chrono-compatible
-/// low-level date algorithms").
+/// Year, month and day from a number of days since 1970 (Hinnant, "chrono-compatible low-level date
+/// algorithms").
 fn civil(days: u64) -> (u64, u64, u64) {
     let z = days + 719_468;
     let (era, doe) = (z / 146_097, z % 146_097);

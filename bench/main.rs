@@ -1,14 +1,14 @@
-//! How fast ASID is beside its engines: a table, and a JSON file with the circumstances.
+//! Compares the speed of ASID with that of its engines: a table, and a JSON file with the
+//! circumstances.
 //!
-//! `cargo xtask bench` builds and calls it. Speeds depend on the machine, so
-//! nothing here passes or fails; each row that has something to be compared with
-//! is measured together with it, in turns, and the best of some rounds counts,
-//! because other load only slows down.
+//! `cargo xtask bench` builds and calls it. Speeds depend on the machine, so nothing here passes or
+//! fails. A row with a counterpart is measured together with it, in turns. The best of some rounds
+//! counts, because other load only slows down.
 
-// A measuring tool talks to the terminal.
+// A measuring tool prints to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
-// Engines and tasks that are linked in register themselves.
+// Linked engines and tasks register themselves.
 #[cfg(feature = "mujoco")]
 use asid_mujoco as _;
 use asid_tasks as _;
@@ -40,7 +40,7 @@ use serde::Serialize;
 
 use crate::machine::Circumstances;
 
-/// Layout version of the JSON file.
+/// Version of the JSON file's layout.
 const SCHEMA: u32 = 1;
 
 /// The task whose scene and pipeline are measured.
@@ -107,7 +107,7 @@ impl Arguments {
     }
 }
 
-/// Everything measured.
+/// All results.
 #[derive(Serialize)]
 struct Results {
     schema: u32,
@@ -205,7 +205,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Measures and writes. A folder that cannot be written to is found out before.
+/// Measures and writes the results. Checks first that the folder can be written to.
 fn run(arguments: &Arguments) -> Result<()> {
     let part = if arguments.peers { "peers" } else { "bench" };
     let page = arguments
@@ -233,7 +233,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Measures beside the engines' own loops: the JSON file and the page.
+/// Measures against the engines' own loops; returns the JSON file and the page.
 fn alone(arguments: &Arguments) -> Result<(String, String)> {
     let engines: Vec<String> = match &arguments.engine {
         Some(name) => vec![find::<BackendEntry>(name)?.name.to_owned()],
@@ -246,7 +246,7 @@ fn alone(arguments: &Arguments) -> Result<(String, String)> {
     Ok((serde_json::to_string_pretty(&results)?, results.markdown()))
 }
 
-/// Measures against Python: the JSON file and the page.
+/// Measures against Python; returns the JSON file and the page.
 #[cfg(feature = "peers")]
 fn against(python: &Path, quick: bool) -> Result<(String, String)> {
     let results = peers::measure(python, quick)?;
@@ -320,7 +320,7 @@ fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
     Ok(results)
 }
 
-/// The command line as it is typed; the Python is xtask's addition.
+/// The command line as typed, without the Python argument that xtask adds.
 fn command() -> String {
     let arguments = std::env::args()
         .skip(1)

@@ -1,5 +1,7 @@
-//! `mj_step` in a plain loop: one `mjModel` a simulation, compiled with its
-//! parameter value, and one `mjData` a simulation, reset before.
+//! `mj_step` in a plain loop.
+//!
+//! Each simulation has its own `mjModel`, compiled with its parameter value, and its own `mjData`,
+//! which is reset first.
 
 use anyhow::{Context, Result, bail};
 use asid_core::Scene;
@@ -10,7 +12,7 @@ use mujoco_rs::wrappers::mj_model::MjModel;
 use crate::bare::Bare;
 use crate::workload::Workload;
 
-/// Simulations of a workload.
+/// The simulations of a workload.
 pub struct Mujoco<'a> {
     data: Vec<MjData<Box<MjModel>>>,
     work: &'a Workload,
@@ -20,7 +22,7 @@ impl<'a> Mujoco<'a> {
     /// Compiles the scene once for each simulation.
     ///
     /// # Errors
-    /// When a target is not a geom's position, or MuJoCo refuses the scene.
+    /// If a target is not a geom's position, or if MuJoCo refuses the scene.
     pub fn new(scene: &Scene, work: &'a Workload) -> Result<Self> {
         let mut spec = MjSpec::from_xml_string(scene.xml()).context("MuJoCo refuses the scene")?;
         let mut data = Vec::with_capacity(work.sims);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
-/// The lines around the text of `part`.
+/// The marker lines around the text of `part`.
 fn markers(part: &str) -> [String; 2] {
     ["begin", "end"].map(|place| format!("<!-- {part}: {place} -->"))
 }
@@ -21,7 +21,7 @@ pub fn table(title: &str, header: &[&str], rows: &[Vec<String>]) -> String {
             cells.chain([header[c].chars().count()]).max().unwrap_or(0)
         })
         .collect();
-    // Numbers are flush right, words left.
+    // Numbers are right-aligned, words left-aligned.
     let right: Vec<bool> = (0..header.len())
         .map(|c| {
             rows.iter()
@@ -69,10 +69,10 @@ pub struct Page {
 }
 
 impl Page {
-    /// Reads a page with markers of `part`, such as `<!-- bench: begin -->`.
+    /// Reads a page with markers of `part`, for example `<!-- bench: begin -->`.
     ///
     /// # Errors
-    /// When it cannot be read or lacks a marker.
+    /// If it cannot be read or lacks a marker.
     pub fn read(path: &Path, part: &str) -> Result<Self> {
         let markers = markers(part);
         let [begin, end] = &markers;
@@ -91,10 +91,10 @@ impl Page {
         })
     }
 
-    /// Writes it with `text` between the markers.
+    /// Writes the page with `text` between the markers.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self, path: &Path, text: &str) -> Result<()> {
         let [begin, end] = &self.markers;
         let whole = format!(

@@ -1,4 +1,4 @@
-//! Physics steps a second of batches, beside the engine's own bare loop.
+//! Physics steps per second of batches, compared with the engine's own bare loop.
 
 use anyhow::Result;
 use asid_core::{BatchConfig, Control, Model, Rollout, Simulator, Task};
@@ -12,10 +12,10 @@ use crate::workload::{Episodes, Workload};
 /// Batch sizes.
 const SIZES: [usize; 4] = [1, 16, 64, 256];
 
-/// Least physics steps of a measurement; smaller batches run several times.
+/// Smallest number of physics steps in a measurement; smaller batches run several times.
 const LEAST_STEPS: u64 = 16_000;
 
-/// One engine, batch size and number of threads.
+/// Measurement for one engine, batch size and number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhysicsRow {
     engine: String,
@@ -24,28 +24,28 @@ pub struct PhysicsRow {
     /// Physics steps of a round.
     steps: u64,
     rounds: usize,
-    /// Best of the rounds, of the batch and of the bare loop.
+    /// Best rate of the rounds, of the batch; the next field is that of the bare loop.
     steps_per_s: f64,
     bare_steps_per_s: f64,
-    /// Of the two rates.
+    /// Ratio of the two rates.
     ratio: f64,
-    /// CPU time of the bare loop by that of the batch, least of the rounds.
+    /// CPU time of the bare loop divided by that of the batch, each the least of the rounds.
     cpu_ratio: f64,
 }
 
-/// How long to measure.
+/// Extent of the measurements.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Rounds of a row; each measures both sides.
     pub rounds: usize,
-    /// Frames of an episode that are run.
+    /// Number of frames of an episode that are run.
     pub frames: usize,
 }
 
 /// All rows of one engine.
 ///
 /// # Errors
-/// When the engine fails.
+/// If the engine fails.
 pub fn rows(
     engine: &str,
     task: &dyn Task,
@@ -104,7 +104,7 @@ pub fn rows(
     Ok(out)
 }
 
-/// A batch and a bare loop with the same work.
+/// A batch and a bare loop with the same workload.
 struct Sides<'a, 'b> {
     simulator: Box<dyn Simulator>,
     loops: &'b mut (dyn Bare + 'a),

@@ -1,7 +1,7 @@
-//! What the C ABI costs: an engine loaded as a plugin beside itself linked in.
+//! Cost of the C ABI: compares an engine loaded as a plugin with the same engine linked in.
 //!
-//! Both do the same work in turns, in one process: whole episodes in one call, and
-//! frame by frame as a learner steps them. They must also read the same, to the bit.
+//! Both do the same work in turns, in one process: whole episodes in one call, and frame by frame,
+//! as a learner steps them. Their readings must agree to the bit.
 
 use std::path::{Path, PathBuf};
 
@@ -12,13 +12,13 @@ use serde::Serialize;
 use crate::clock::{Cost, timed};
 use crate::workload::{Episodes, Workload};
 
-/// Simulations of the batch.
+/// Number of simulations in the batch.
 const BATCH: usize = 64;
 
-/// Rounds for each that other measurements take.
+/// Factor of the rounds compared with other measurements.
 const MORE_ROUNDS: usize = 5;
 
-/// One engine, way of calling and number of threads.
+/// Measurement for one engine, way of calling and number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct PluginRow {
     engine: String,
@@ -26,20 +26,20 @@ pub struct PluginRow {
     batch: usize,
     threads: usize,
     rounds: usize,
-    /// Physics steps a second of the linked engine, best of the rounds.
+    /// Physics steps per second of the linked engine, best of the rounds.
     steps_per_s: f64,
-    /// Time loaded by time linked, best of the rounds each.
+    /// Time of the loaded engine divided by that of the linked one, each the best of the rounds.
     ratio: f64,
-    /// The same of CPU time.
+    /// The same ratio of CPU times.
     cpu_ratio: f64,
-    /// Median over the rounds of the ratio within a round.
+    /// Median over the rounds of the ratio within one round.
     median_ratio: f64,
 }
 
-/// Where the build leaves the plugin of an engine.
+/// Path at which the build leaves the plugin of an engine.
 ///
 /// # Errors
-/// When it is not there.
+/// If it is missing.
 pub fn library(engine: &str) -> Result<PathBuf> {
     let own = std::env::current_exe().context("cannot tell where this program lies")?;
     let name = format!(
@@ -55,7 +55,7 @@ pub fn library(engine: &str) -> Result<PathBuf> {
 /// All rows of one engine.
 ///
 /// # Errors
-/// When an engine fails, or the two do not read the same.
+/// If an engine fails, or if the readings of the two differ.
 pub fn rows(
     engine: &str,
     task: &dyn Task,
@@ -87,7 +87,7 @@ pub fn rows(
             let (mut best, mut best_loaded) = (Cost::ENDLESS, Cost::ENDLESS);
             let mut ratios = Vec::new();
             for round in 0..rounds {
-                // Who goes first changes, so that neither always meets a warm cache.
+                // The sides take turns in going first, so that neither always finds a warm cache.
                 let (a, b) = if round % 2 == 0 {
                     let a = one.run(frames)?;
                     (a, other.run(frames)?)
@@ -120,13 +120,13 @@ pub fn rows(
     Ok(out)
 }
 
-/// A batch with its work.
+/// A batch with its workload.
 struct Side<'a> {
     simulator: Box<dyn Simulator>,
     work: &'a Workload,
     sims: Vec<usize>,
     record: Recording,
-    /// Commands of one frame after the other, `frames x sims x nu`.
+    /// Commands, frame by frame, `frames x sims x nu`.
     by_frame: Vec<f64>,
     readings: Vec<f64>,
 }
@@ -160,7 +160,7 @@ impl<'a> Side<'a> {
         })
     }
 
-    /// Runs all episodes, `frames` frames a call.
+    /// Runs all episodes with `frames` frames per call.
     fn run(&mut self, frames: usize) -> Result<Cost> {
         let work = self.work;
         self.simulator.reset(&self.sims)?;

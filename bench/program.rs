@@ -1,4 +1,4 @@
-//! The program itself: whole runs, identification alone, start-up.
+//! The program itself: whole runs, identification alone, start-up time.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
-/// Starts of a command whose times are looked at.
+/// Number of starts of a command that are timed.
 const STARTS: usize = 20;
 
 /// Cost of one call of the program.
@@ -15,12 +15,12 @@ const STARTS: usize = 20;
 pub struct RunRow {
     engine: String,
     command: String,
-    /// From the start of the process to its end.
+    /// Time from the start of the process to its end.
     wall_s: f64,
     physics_steps: u64,
 }
 
-/// How fast a command that computes nothing is.
+/// Run time of a command that computes nothing.
 #[derive(Clone, Debug, Serialize)]
 pub struct StartRow {
     command: String,
@@ -29,10 +29,10 @@ pub struct StartRow {
     median_s: f64,
 }
 
-/// The `asid` program beside this one.
+/// Path of the `asid` program beside this one.
 ///
 /// # Errors
-/// When it is not there.
+/// If it is missing.
 pub fn find() -> Result<PathBuf> {
     let own = std::env::current_exe().context("cannot tell where this program lies")?;
     let asid = own.with_file_name(format!("asid{}", std::env::consts::EXE_SUFFIX));
@@ -45,10 +45,10 @@ pub fn find() -> Result<PathBuf> {
     Ok(asid)
 }
 
-/// A whole run with the defaults and identification alone from its log.
+/// Times a whole run with the defaults, and identification alone from its log.
 ///
 /// # Errors
-/// When the program fails.
+/// If the program fails.
 pub fn runs(asid: &Path, task: &str, engine: &str) -> Result<Vec<RunRow>> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let whole = folder.path().join("run");
@@ -78,7 +78,7 @@ pub fn runs(asid: &Path, task: &str, engine: &str) -> Result<Vec<RunRow>> {
     Ok(vec![row("run", run), row("identify", identify)])
 }
 
-/// Calls the program; its wall-clock time and the physics steps in its `result.json`.
+/// Calls the program; returns its wall-clock time and the physics steps in its `result.json`.
 fn call(asid: &Path, arguments: &[&str], out: &Path) -> Result<(f64, u64)> {
     let start = Instant::now();
     let status = Command::new(asid)
@@ -102,7 +102,7 @@ fn call(asid: &Path, arguments: &[&str], out: &Path) -> Result<(f64, u64)> {
 /// Times commands that only start and print.
 ///
 /// # Errors
-/// When the program fails.
+/// If the program fails.
 pub fn starts(asid: &Path) -> Result<Vec<StartRow>> {
     [&["list"][..], &["run", "--help"]]
         .into_iter()
@@ -133,7 +133,7 @@ pub fn starts(asid: &Path) -> Result<Vec<StartRow>> {
         .collect()
 }
 
-/// Runs as a table.
+/// The runs as a table.
 pub fn table_of_runs(rows: &[RunRow]) -> Vec<Vec<String>> {
     rows.iter()
         .map(|r| {
@@ -147,7 +147,7 @@ pub fn table_of_runs(rows: &[RunRow]) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Start-up times as a table.
+/// The start-up times as a table.
 pub fn table_of_starts(rows: &[StartRow]) -> Vec<Vec<String>> {
     rows.iter()
         .map(|r| {

@@ -7,7 +7,7 @@ use asid_rapier::bare::{BareScene, BareWorld};
 use crate::bare::Bare;
 use crate::workload::Workload;
 
-/// Worlds of rapier in plain loops.
+/// rapier's worlds in plain loops.
 pub struct Rapier<'a> {
     scene: BareScene,
     worlds: Vec<BareWorld>,
@@ -15,10 +15,10 @@ pub struct Rapier<'a> {
 }
 
 impl<'a> Rapier<'a> {
-    /// The loop for a scene.
+    /// The bare loop for a scene.
     ///
     /// # Errors
-    /// When the engine refuses it.
+    /// If the engine refuses it.
     pub fn new(scene: &Scene, work: &'a Workload) -> Result<Self> {
         Ok(Self {
             scene: BareScene::new(scene, &work.targets)?,

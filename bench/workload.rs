@@ -1,5 +1,5 @@
-//! What is stepped: simulations of one task, each with its own parameter value,
-//! start and commands.
+//! The simulated workload: simulations of one task, each with its own parameter value, initial
+//! state and commands.
 
 use anyhow::Result;
 use asid_core::layout::Layout;
@@ -8,29 +8,30 @@ use asid_core::rng::Rng;
 use asid_core::{Parameter, Streams, Target, Task};
 use rand::Rng as _;
 
-/// Control steps for which a random push keeps its direction. A walk that turns
-/// at every step stays where it is and rarely meets the object.
+/// Control steps for which a random push keeps its direction.
+///
+/// A walk that changes direction at every step stays where it is and rarely meets the object.
 const HELD: usize = 5;
 
-/// Simulations to run; arrays have one row each.
+/// Simulations to run; arrays have one row per simulation.
 pub struct Workload {
     /// Number of simulations.
     pub sims: usize,
-    /// What [`Workload::values`] sets.
+    /// Targets that [`Workload::values`] sets.
     pub targets: Vec<Target>,
-    /// `sims x targets`.
+    /// Parameter values, `sims x targets`.
     pub values: Vec<f64>,
-    /// Start, `sims x nq`.
+    /// Initial positions, `sims x nq`.
     pub qpos: Vec<f64>,
-    /// Start, `sims x nv`.
+    /// Initial velocities, `sims x nv`.
     pub qvel: Vec<f64>,
-    /// `sims x frames x nu`.
+    /// Commands, `sims x frames x nu`.
     pub control: Vec<f64>,
-    /// Frames of a simulation.
+    /// Frames per simulation.
     pub frames: usize,
-    /// Physics steps of a frame.
+    /// Physics steps per frame.
     pub substeps: usize,
-    /// Entries of a command.
+    /// Number of entries of a command.
     pub nu: usize,
 }
 
@@ -40,15 +41,15 @@ pub struct Episodes {
     pub horizon: usize,
     /// Unknowns, `episodes x d`.
     pub theta: Vec<f64>,
-    /// Start poses, `episodes x coordinates`.
+    /// Initial poses, `episodes x coordinates`.
     pub starts: Vec<f64>,
     /// Actions by control step: `horizon` rows of `episodes x action`.
     pub actions: Vec<Vec<f64>>,
 }
 
 impl Episodes {
-    /// Random episodes: unknowns and starts from their priors, pushes that keep
-    /// their direction for half a second.
+    /// Random episodes: unknowns and initial poses from their priors, and pushes that keep their
+    /// direction for half a second.
     pub fn random(task: &dyn Task, parameters: &[Parameter], episodes: usize, seed: u64) -> Self {
         let mut rng: Rng = Streams::new(seed).stream("bench");
         let protocol = task.exploration();
@@ -81,7 +82,7 @@ impl Episodes {
     /// Commands of every episode, `episodes x frames x nu`.
     ///
     /// # Errors
-    /// When the task has no commander.
+    /// If the task has no commander.
     pub fn commands(&self, task: &dyn Task, nu: usize) -> Result<Vec<f64>> {
         let protocol = task.exploration();
         let (block, width) = (protocol.frames_per_step * nu, protocol.action.len());
@@ -99,10 +100,11 @@ impl Episodes {
 }
 
 impl Workload {
-    /// The episodes as simulations: `copies` of each, whose unknowns (`episodes x
-    /// copies x d`) are `theta`.
+    /// The episodes as simulations: `copies` of each, with the unknowns `theta` (`episodes x copies
+    /// x d`).
     ///
     /// # Errors
+    /// If the layout is not that of the task's scene.
     /// When the layout is not that of the task's scene.
     pub fn new(
         task: &dyn Task,
@@ -147,7 +149,7 @@ impl Workload {
         Ok(out)
     }
 
-    /// The same with fewer frames.
+    /// The same workload with fewer frames.
     pub fn shortened(mut self, frames: usize) -> Self {
         let old = self.frames * self.nu;
         let new = frames.min(self.frames) * self.nu;
@@ -162,7 +164,7 @@ impl Workload {
         (self.sims * self.frames * self.substeps) as u64
     }
 
-    /// Row `i` of an array with one row a simulation.
+    /// Row `i` of an array with one row per simulation.
     pub fn row<'a>(&self, array: &'a [f64], i: usize) -> &'a [f64] {
         let width = array.len() / self.sims;
         &array[i * width..(i + 1) * width]

@@ -1,4 +1,4 @@
-//! Environment steps a second of a whole training: collection and updates.
+//! Environment steps per second of a whole training: collection and updates.
 
 use std::sync::atomic::Ordering;
 
@@ -14,7 +14,7 @@ use super::spread::{ratios, spread};
 use super::{Effort, INTERFACES, THREADS};
 use crate::clock::timed;
 
-/// One side on one task, one entry a round.
+/// Results of one side on one task, one entry per round.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     task: &'static str,
@@ -22,17 +22,19 @@ pub struct Row {
     threads: usize,
     environment_steps: u64,
     env_steps_per_s: Vec<f64>,
-    /// CPU time of a step, on all threads, ms.
+    /// CPU time of a step on all threads, ms.
     cpu_ms_per_step: Vec<f64>,
-    /// ASID's steps a second by this side's, each round.
+    /// ASID's steps per second divided by this side's, per round.
     asid_by_this: Vec<f64>,
-    /// CPU time of this side by ASID's, each round: other load on the machine bears on it less.
+    /// CPU time of this side divided by ASID's, per round; other load on the machine affects it
+    /// less.
     cpu_by_asid: Vec<f64>,
-    /// Mean return of the episodes before the first and before the last update, nat; absent where it is not told.
+    /// Mean return of the episodes before the first and before the last update, nat; absent if not
+    /// reported.
     returns: Vec<[Option<f64>; 2]>,
 }
 
-/// What a training came to.
+/// The result of a training.
 #[derive(Deserialize)]
 struct Trained {
     seconds: f64,
@@ -44,13 +46,13 @@ struct Trained {
 /// Trains all sides in turns.
 ///
 /// # Errors
-/// When a side fails, or does another number of steps.
+/// If a side fails or takes another number of steps.
 pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result<Vec<Row>> {
     let mut sides = vec!["asid".to_owned()];
     sides.extend(INTERFACES.map(|i| format!("stable-baselines3, `{i}`")));
     let mut trained: Vec<Vec<Trained>> = sides.iter().map(|_| Vec::new()).collect();
     for round in 0..effort.rounds {
-        // Who goes first changes, so that no side always meets a machine that is warm.
+        // The sides take turns in going first, so that none always finds a warm machine.
         for turn in 0..sides.len() {
             let side = (turn + round) % sides.len();
             eprintln!(
@@ -112,7 +114,7 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
         .collect())
 }
 
-/// One training of ASID, as `asid explore --explorer fisher-ppo` does it.
+/// One training of ASID, like `asid explore --explorer fisher-ppo`.
 fn ours(described: &Described, steps: usize, seed: u64) -> Result<Trained> {
     let entry = find::<ExplorerEntry>(EXPLORER)?;
     let mut settings = (entry.defaults)();
@@ -126,7 +128,8 @@ fn ours(described: &Described, steps: usize, seed: u64) -> Result<Trained> {
     let problem = described.problem(seed);
     let before = described.steps.load(Ordering::Relaxed);
     let (done, cost) = timed(|| -> Result<Vec<Option<f64>>> {
-        // An explorer that can be trained beforehand plays what it is given otherwise.
+        // Without this call, an explorer that can be trained in advance would only play the network
+        // it is given.
         if explorer.train(&problem, file.path())? {
             return Ok(Vec::new());
         }

@@ -1,4 +1,4 @@
-//! Time and accuracy of identification from one log, beside MuJoCo's own toolbox.
+//! Time and accuracy of identification from one log, compared with MuJoCo's own toolbox.
 
 use std::sync::atomic::Ordering;
 
@@ -17,20 +17,22 @@ use super::spread::{ratios, spread};
 use super::{Effort, THREADS};
 use crate::clock::timed;
 
-/// ASID's identifiers that are compared, where they are built in.
+/// ASID's identifiers that are compared, if they are built in.
 const IDENTIFIERS: [&str; 2] = ["reps", "gauss-newton"];
 
-/// Finite differences of the toolbox: its default, and wide ones, in deviations of the prior or of the first
-/// reading. With contact the path is rough, and a difference by a tiny step is mostly luck.
+/// Finite-difference steps of the toolbox: its default, and wide ones in standard deviations of the
+/// prior or of the first reading.
+///
+/// With contact the cost is rough, and the derivative from a tiny step is mostly random.
 const DIFFERENCES: [Option<f64>; 2] = [None, Some(0.1)];
 
-/// Which episode is logged: a search by this explorer.
+/// Explorer whose search gives the logged episode.
 const LOGGED_BY: &str = "fisher-cem";
 
-/// Refits of that search: enough to meet the object well, and two seconds instead of six.
+/// Refits of that search: enough to meet the object well, in two seconds instead of six.
 const REFITS: i64 = 2;
 
-/// One method on one task, one entry a log.
+/// Results of one method on one task, one entry per log.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     task: &'static str,
@@ -39,20 +41,20 @@ pub struct Row {
     unit: String,
     seconds: Vec<f64>,
     cpu_seconds: Vec<f64>,
-    /// Simulations of the episode; absent where they are not counted.
+    /// Number of simulations of the episode; absent if they are not counted.
     simulations: Vec<Option<u64>>,
     truth: Vec<f64>,
-    /// Smallest and largest value a priori.
+    /// Smallest and largest value of the prior.
     range: [f64; 2],
     estimate: Vec<f64>,
     interval95: Vec<[f64; 2]>,
-    /// Time of the toolbox with its defaults by this method's, each log.
+    /// Time of the toolbox with its defaults divided by this method's, per log.
     sysid_by_this: Vec<f64>,
-    /// The same of CPU time.
+    /// The same ratio of CPU times.
     sysid_cpu_by_this: Vec<f64>,
 }
 
-/// What a method found of one log.
+/// Result of a method for one log.
 #[derive(Deserialize)]
 struct Found {
     parameters: Vec<Estimate>,
@@ -86,7 +88,7 @@ impl Method {
 /// Identifies every log with every method, in turns.
 ///
 /// # Errors
-/// When a method fails.
+/// If a method fails.
 pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result<Vec<Row>> {
     let ours = IDENTIFIERS.into_iter();
     let ours = ours.filter(|name| find::<IdentifierEntry>(name).is_ok());
@@ -121,7 +123,7 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
     }
     let seconds = |all: &[Found]| -> Vec<f64> { all.iter().map(|f| f.seconds).collect() };
     let cpu = |all: &[Found]| -> Vec<f64> { all.iter().map(|f| f.cpu_seconds).collect() };
-    // The toolbox with its defaults comes first.
+    // The toolbox with its defaults is the first method.
     let toolbox = (seconds(&found[0]), cpu(&found[0]));
     Ok(methods
         .iter()
@@ -144,7 +146,7 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
         .collect())
 }
 
-/// An exploration episode at a truth drawn from the prior, with the trackers' noise.
+/// An exploration episode at a true value drawn from the prior, with the trackers' noise.
 fn logged(described: &Described, seed: u64) -> Result<(f64, Episode)> {
     let streams = Streams::new(seed).child("real world");
     let mut rng: Rng = streams.stream("truth");

@@ -1,10 +1,10 @@
-//! Beside Python: the same exploration with Stable-Baselines3 and MuJoCo's bindings, and the
-//! same identification with MuJoCo's own toolbox.
+//! Comparison with Python: the same exploration with Stable-Baselines3 and MuJoCo's bindings, and
+//! the same identification with MuJoCo's own toolbox.
 //!
-//! This folder holds both sides. The Rust side describes each problem in a file ([`problem`]),
-//! so that the Python side cannot differ in what an environment step is, has it play reference
-//! episodes, and then measures both in turns, in one run. The Python process ([`process`]) stays
-//! alive: imports and compilation of the scene are not measured on either side.
+//! This folder holds both sides. The Rust side describes each problem in a file ([`problem`]), so
+//! that both sides have the same environment steps. It makes the Python side play reference
+//! episodes, then measures both in turns in one run. The Python process ([`process`]) stays alive,
+//! so neither side measures imports or the compilation of the scene.
 
 mod explore;
 mod identify;
@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-// Algorithms that are linked in register themselves.
+// Linked algorithms register themselves.
 use asid_algorithms as _;
 use asid_core::registry::{BackendEntry, find};
 use asid_nn as _;
@@ -28,30 +28,32 @@ use crate::page;
 use problem::Described;
 use process::Python;
 
-/// Layout version of the JSON file.
+/// Version of the JSON file's layout.
 const SCHEMA: u32 = 1;
 
-/// Tasks that are compared: one whose unknown is a mass, one whose unknown is a friction.
+/// Compared tasks: one with an unknown mass, one with an unknown friction.
 const TASKS: [&str; 2] = ["rod-balancing", "sphere-striking"];
 
-/// Threads of either side.
+/// Threads of each side.
 const THREADS: usize = 2;
 
-/// How the Python side steps its simulations: MuJoCo's two interfaces to many simulations under an environment
-/// vectorised by hand, and an environment of Gymnasium with `mj_step` in a process of its own for each episode.
+/// Ways in which the Python side steps its simulations.
+///
+/// Two are MuJoCo's interfaces to many simulations, under an environment vectorised by hand. The
+/// third is an environment of Gymnasium that calls `mj_step`, with one process per episode.
 const INTERFACES: [&str; 3] = ["mujoco.rollout", "mujoco.batch", "mj_step"];
 
-/// How much is measured.
+/// Extent of the measurements.
 struct Effort {
-    /// Trainings of each side and task.
+    /// Trainings per side and task.
     rounds: usize,
-    /// Environment steps of a training.
+    /// Environment steps per training.
     steps: usize,
-    /// Logs of each task.
+    /// Logs per task.
     logs: usize,
 }
 
-/// What the Python side's reference episodes were off by.
+/// Deviations of the Python side's reference episodes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Deviations {
     /// Commands, rad.
@@ -62,13 +64,15 @@ struct Deviations {
     returns: f64,
 }
 
-/// A commander that differs by more, rad, is another commander. Rounding makes 1e-12.
+/// Largest deviation, rad, between equal commanders. Rounding makes 1e-12.
 const SAME_COMMANDS: f64 = 1e-9;
-/// A path that differs by more, m, is another path. Each control step of a rollout starts the solver anew, and what
-/// that leaves, some 1e-10 of a force, grows with contacts; the tracker's noise is 2 mm.
+/// Largest deviation, m, between equal paths.
+///
+/// Each control step of a rollout restarts the solver. This leaves about 1e-10 of a force, which
+/// grows with contacts. The tracker's noise is 2 mm.
 const SAME_POSITIONS: f64 = 1e-4;
 
-/// One interface's reference episodes.
+/// Reference episodes of one interface.
 #[derive(Clone, Debug, Serialize)]
 struct CheckRow {
     task: &'static str,
@@ -76,7 +80,7 @@ struct CheckRow {
     deviations: Deviations,
 }
 
-/// Everything measured.
+/// All results.
 #[derive(Serialize)]
 pub struct Results {
     schema: u32,
@@ -88,7 +92,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// The page.
+    /// The page in Markdown.
     pub fn markdown(&self) -> String {
         let head = format!(
             "`{}`, {}\n\n",
@@ -109,10 +113,10 @@ impl Results {
     }
 }
 
-/// Measures both sides with the Python of this path.
+/// Measures both sides with the Python at this path.
 ///
 /// # Errors
-/// When the Python process fails, plays other reference episodes, or an algorithm fails.
+/// If the Python process fails, plays other reference episodes, or an algorithm fails.
 pub fn measure(python: &Path, quick: bool) -> Result<Results> {
     let effort = if quick {
         Effort {
@@ -132,7 +136,7 @@ pub fn measure(python: &Path, quick: bool) -> Result<Results> {
     let mut peer = Python::start(python, folder.path())?;
     let versions: BTreeMap<String, String> = peer.ask(&json!({"do": "start"}))?;
     let mut named: Vec<(String, String)> = versions.into_iter().collect();
-    // Both sides have a MuJoCo, and they must be one version.
+    // Both sides have a MuJoCo, and the versions must agree.
     for (name, version) in &mut named {
         if name == "mujoco" && *version != backend.version() {
             bail!(
@@ -163,7 +167,7 @@ pub fn measure(python: &Path, quick: bool) -> Result<Results> {
     Ok(results)
 }
 
-/// Has the peer play the reference episodes.
+/// Makes the peer play the reference episodes and returns its deviations.
 fn check(peer: &mut Python, described: &Described, interface: &'static str) -> Result<CheckRow> {
     let request = json!({"do": "check", "problem": described.file, "interface": interface});
     let deviations: Deviations = peer.ask(&request)?;

@@ -16,16 +16,17 @@ use serde_json::{Value, json};
 use super::THREADS;
 use crate::workload::Episodes;
 
-/// Episodes that the Python side has to play alike. Random pushing meets the object in one of some five.
+/// Episodes that both sides must play alike. About one in five random pushes meets the object.
 const REFERENCES: usize = 16;
 
 /// Seed of the reference episodes.
 const REFERENCE_SEED: u64 = 2;
 
-/// Return, nat, of an episode whose hand met the object; without contact it is below 0.5.
+/// Smallest return, nat, of an episode in which the hand met the object; without contact it is
+/// below 0.5.
 const MET: f64 = 1.0;
 
-/// The explorer that is compared.
+/// The compared explorer.
 pub const EXPLORER: &str = "fisher-ppo";
 
 /// A task on an engine, and the file that describes it.
@@ -34,13 +35,13 @@ pub struct Described {
     pub name: &'static str,
     /// The task.
     pub task: Box<dyn Task>,
-    /// Its scene, compiled.
+    /// Its compiled scene.
     pub model: Arc<dyn Model>,
-    /// What the engine can do.
+    /// Capabilities of the engine.
     pub capabilities: Capabilities,
     /// Its unknowns.
     pub parameters: Vec<Parameter>,
-    /// The description.
+    /// Path of the description.
     pub file: PathBuf,
     /// Environment steps taken so far.
     pub steps: AtomicU64,
@@ -48,10 +49,10 @@ pub struct Described {
 }
 
 impl Described {
-    /// Compiles the task and writes scene and description into `folder`, which it makes.
+    /// Compiles the task; writes scene and description into `folder`, which it creates.
     ///
     /// # Errors
-    /// When the engine refuses the scene or a file cannot be written.
+    /// If the engine refuses the scene, or if a file cannot be written.
     pub fn new(name: &'static str, backend: &dyn Backend, folder: &Path) -> Result<Self> {
         let task = (find::<TaskEntry>(name)?.make)()?;
         let model = backend.load(task.scene())?;
@@ -73,7 +74,7 @@ impl Described {
         Ok(described)
     }
 
-    /// What an algorithm is given.
+    /// The problem for an algorithm.
     pub fn problem(&self, seed: u64) -> Problem<'_> {
         Problem {
             task: &*self.task,
@@ -137,7 +138,7 @@ impl Described {
         }))
     }
 
-    /// Episodes as they are played here: what is done, and what comes of it.
+    /// Episodes as this side plays them: commands and results.
     fn reference(&self, fisher: &Value) -> Result<Value> {
         let settings: FisherSettings = serde_json::from_value(fisher.clone())?;
         let n = REFERENCES;
@@ -150,7 +151,7 @@ impl Described {
         let rows = |all: &[f64], each: usize| -> Vec<Vec<f64>> {
             all.chunks_exact(each).map(<[f64]>::to_vec).collect()
         };
-        // The first signal of the tasks compared is the object's position.
+        // The first signal of the compared tasks is the object's position.
         let width = batch.width();
         let first = |all: &[f64]| -> Vec<Vec<f64>> {
             all.chunks_exact(width).map(|r| r[..3].to_vec()).collect()
@@ -170,7 +171,7 @@ impl Described {
         let nu = self.model.layout().nu();
         let commands = episodes.commands(&*self.task, nu)?;
         let block = protocol.frames_per_step * nu;
-        // By control step, then episode, then frame.
+        // Order: control step, episode, frame.
         let commands: Vec<Vec<Vec<Vec<f64>>>> = (0..protocol.horizon)
             .map(|step| {
                 commands

@@ -1,4 +1,4 @@
-//! The Python process: a line of JSON to it, a line of JSON from it.
+//! The Python process: each request and each answer is a line of JSON.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -9,10 +9,10 @@ use anyhow::{Context, Result, bail};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// Lines of what the process said that an error repeats.
+/// Lines of the process' output that an error repeats.
 const LAST_LINES: usize = 4;
 
-/// A Python that serves requests until it is dropped.
+/// A Python process that serves requests until it is dropped.
 pub struct Python {
     child: Child,
     requests: ChildStdin,
@@ -21,16 +21,16 @@ pub struct Python {
 }
 
 impl Python {
-    /// Starts `program`; what it says besides answers goes to a file in `folder`.
+    /// Starts `program`; its other output goes to a file in `folder`.
     ///
     /// # Errors
-    /// When it cannot be started.
+    /// If it cannot be started.
     pub fn start(program: &Path, folder: &Path) -> Result<Self> {
         let said = folder.join("python.log");
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/serve.py");
         let mut child = Command::new(program)
             .arg(script)
-            // The repository stays free of compiled modules.
+            // Keeps compiled modules out of the repository.
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -50,7 +50,7 @@ impl Python {
     /// Sends a request and waits for its answer.
     ///
     /// # Errors
-    /// When the process ended, answers with an error, or answers something else.
+    /// If the process has ended, answers with an error, or answers something else.
     pub fn ask<T: DeserializeOwned>(&mut self, request: &Value) -> Result<T> {
         let sent = writeln!(self.requests, "{request}").and_then(|()| self.requests.flush());
         let mut line = String::new();
@@ -74,7 +74,7 @@ impl Python {
 
 impl Drop for Python {
     fn drop(&mut self) {
-        // Nothing is left to be saved, and a process that has ended need not be stopped.
+        // There is nothing to save, and an ended process need not be stopped.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,6 +1,6 @@
-//! A handful of measurements in a few characters: the median, and the least and the most.
+//! A few measurements as short text: the median, the minimum and the maximum.
 
-/// The median; the mean of the middle two of an even number.
+/// The median; for an even number of values the mean of the middle two.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -11,7 +11,7 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// The median with the least and the most in brackets, each shown by `show`.
+/// The median, with minimum and maximum in brackets, each formatted by `show`.
 pub fn spread(values: &[f64], show: impl Fn(f64) -> String) -> String {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -27,7 +27,7 @@ pub fn spread(values: &[f64], show: impl Fn(f64) -> String) -> String {
     }
 }
 
-/// `top` by `bottom`, entry by entry.
+/// `top` divided by `bottom`, entry by entry.
 pub fn ratios(top: &[f64], bottom: &[f64]) -> Vec<f64> {
     top.iter().zip(bottom).map(|(a, b)| a / b).collect()
 }

@@ -1,7 +1,8 @@
-//! `cargo xtask bench`: builds the program and its benchmark with every engine, and measures.
+//! `cargo xtask bench`: builds the program and its benchmark with every engine, and runs the
+//! benchmark.
 //!
-//! The measuring itself is in the crate `asid-bench`, since this one links no engine. With
-//! `--peers` it measures against Python instead, where the packages can be had.
+//! The crate `asid-bench` measures, since this crate links no engine. With `--peers` it measures
+//! against Python instead, if the packages are available.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,7 +14,7 @@ use crate::peers;
 use crate::setup;
 use crate::stage::Stages;
 
-/// What is measured beside the engines' own loops.
+/// Build arguments of the comparison with the engines' own loops.
 const BUILD: [&str; 7] = [
     "build",
     "--release",
@@ -24,7 +25,7 @@ const BUILD: [&str; 7] = [
     "--features=asid/mujoco,asid-bench/mujoco",
 ];
 
-/// What is measured against Python.
+/// Build arguments of the comparison with Python.
 const BUILD_PEERS: [&str; 4] = [
     "build",
     "--release",
@@ -32,7 +33,7 @@ const BUILD_PEERS: [&str; 4] = [
     "--features=asid-bench/peers",
 ];
 
-/// Sets up what is needed, builds in release and passes `arguments` on.
+/// Sets up the libraries, builds in release and passes `arguments` on.
 pub fn run(arguments: &[String]) -> Result<bool> {
     let own = std::env::current_exe().context("cannot tell where this program lies")?;
     let target = own.ancestors().nth(2).context("no target folder")?;
@@ -43,7 +44,7 @@ pub fn run(arguments: &[String]) -> Result<bool> {
     Ok(Stages::default().cargo("build", &BUILD, &[])? && measure(target, arguments, None)?)
 }
 
-/// Measures against Python; without its packages there is nothing to measure, and that is said.
+/// Measures against Python. Without its packages it reports this and measures nothing.
 fn against(target: &Path, arguments: &[String]) -> Result<bool> {
     setup::run(&[&MUJOCO, &TORCH])?;
     let python = match peers::environment(&target.join("peers")) {

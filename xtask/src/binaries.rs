@@ -1,7 +1,8 @@
-//! The workspace's tests, two binaries at a time.
+//! Runs the workspace's tests, two binaries at a time.
 //!
-//! `cargo test` runs one binary after the other, and each ends with its slowest test while the other cores wait. Here the binaries are
-//! built by one call of cargo, and two of them run at any time. What a binary prints is shown when it has ended.
+//! `cargo test` runs one binary after the other, and the other cores wait for the slowest test of
+//! each. Here one call of cargo builds the binaries, and two of them run at any time. The output of
+//! a binary is shown when it has ended.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,12 +17,16 @@ use serde_json::Value;
 use crate::library::repository;
 use crate::stage::ALL_FEATURES;
 
-/// Binaries that run at a time. Each has as many threads as there are cores, so that two fill the gaps of each other; a third would
-/// only take time from tests that have a limit of it.
+/// Binaries that run at a time.
+///
+/// Each has as many threads as there are cores, so two fill each other's gaps. A third would only
+/// take time from tests that have a time limit.
 const AT_A_TIME: usize = 2;
 
-/// Tells tests of plugins that these are built. Each would call cargo otherwise, which takes the libraries out of their places for a
-/// moment while a test beside it loads them.
+/// Tells tests of plugins that the plugins are already built.
+///
+/// Otherwise each test would call cargo, which removes the libraries from their places for a moment
+/// while another test loads them.
 const PLUGINS_ARE_BUILT: &str = "ASID_TESTS_PLUGINS_ARE_BUILT";
 
 /// A test binary of the workspace.
@@ -34,10 +39,10 @@ struct Binary {
     folder: PathBuf,
 }
 
-/// Builds all tests and runs them, those of the documentation at the end; true where all pass.
+/// Builds all tests and runs them, documentation tests last; returns whether all pass.
 ///
 /// # Errors
-/// When cargo or a binary cannot be started.
+/// If cargo or a binary cannot be started.
 pub fn run() -> Result<bool> {
     let Some(binaries) = build()? else {
         return Ok(false);
@@ -63,7 +68,9 @@ fn cargo() -> Command {
     cargo
 }
 
-/// The test binaries, built, and after them the plugins that they load; `None` where a build failed and cargo has said why.
+/// Builds the test binaries, then the plugins that they load.
+///
+/// `None` if a build fails; cargo has then printed the reason.
 fn build() -> Result<Option<Vec<Binary>>> {
     let built = cargo()
         .args(["test", "--workspace", "--no-run", ALL_FEATURES])
@@ -85,7 +92,7 @@ fn build() -> Result<Option<Vec<Binary>>> {
     Ok(Some(lines.lines().filter_map(binary).collect()))
 }
 
-/// The test binary that a message of cargo tells of.
+/// The test binary in a message of cargo, if the message is about one.
 fn binary(message: &str) -> Option<Binary> {
     let message: Value = serde_json::from_str(message).ok()?;
     if message["profile"]["test"] != true {
@@ -103,7 +110,7 @@ fn binary(message: &str) -> Option<Binary> {
     })
 }
 
-/// Runs the binaries and shows what each says; the names of those that failed.
+/// Runs the binaries and shows their output; returns the names of those that failed.
 fn run_all(binaries: &[Binary]) -> Result<Vec<String>> {
     let queue = Mutex::new(binaries.iter());
     let failed = Mutex::new(Vec::new());
@@ -137,7 +144,7 @@ fn run_all(binaries: &[Binary]) -> Result<Vec<String>> {
     Ok(failed.into_inner().unwrap_or_default())
 }
 
-/// Shows what a binary said, in one piece.
+/// Shows the output of a binary in one piece.
 fn show(name: &str, output: &Output, start: Instant) -> Result<()> {
     let mut out = std::io::stdout().lock();
     let seconds = start.elapsed().as_secs_f64();

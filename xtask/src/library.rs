@@ -1,8 +1,8 @@
-//! The native libraries, pinned: which wheels hold them and where each file goes.
+//! The pinned native libraries: the wheels that hold them, and the place of each file.
 //!
-//! Wheels from the Python package index are the one source that carries both
-//! libraries for every platform with a published hash. The interpreter version
-//! in a pin only names the file: nothing of Python is kept.
+//! Wheels of the Python package index are the only source of both libraries for every platform with
+//! a published hash. The interpreter version in a pin only names the file; nothing of Python is
+//! kept.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -19,19 +19,19 @@ pub struct Library {
     pub folder: &'static str,
     /// Environment variable through which the build finds it.
     pub variable: &'static str,
-    /// Variable that, once set, makes the build look elsewhere altogether.
+    /// Variable that, if it is set, makes the build look somewhere else.
     pub elsewhere: Option<&'static str>,
     /// A file, relative to the folder, that any installation has.
     pub landmark: &'static str,
-    /// Where the files come from.
+    /// Wheels that hold its files.
     pub wheels: &'static [Wheel],
-    /// Symbolic links to make: (link, its target in the same folder).
+    /// Symbolic links to create: (link, its target in the same folder).
     pub links: &'static [(&'static str, &'static str)],
     /// Small files to write: (path, content).
     pub texts: &'static [(&'static str, &'static str)],
 }
 
-/// MuJoCo: the library under its own name, the name the linker looks for, the headers.
+/// MuJoCo: the library under its own name, the name that the linker looks for, and the headers.
 pub const MUJOCO: Library = Library {
     name: "mujoco",
     folder: "mujoco",
@@ -51,11 +51,11 @@ pub const MUJOCO: Library = Library {
     texts: &[],
 };
 
-/// libtorch for the CPU, out of the CUDA build of PyTorch.
+/// libtorch for the CPU, from the CUDA build of PyTorch.
 ///
-/// `libtorch_cpu.so` of that build names two small CUDA libraries, hence the
-/// two further wheels. `libtorch.so` is a linker script, so that nothing links
-/// the CUDA half; `build-version` lets `torch-sys` check the version.
+/// `libtorch_cpu.so` of that build needs two small CUDA libraries, hence the two further wheels.
+/// `libtorch.so` is a linker script, so that nothing links the CUDA half. `build-version` lets
+/// `torch-sys` check the version.
 pub const TORCH: Library = Library {
     name: "torch",
     folder: "libtorch",
@@ -104,12 +104,12 @@ pub const TORCH: Library = Library {
 pub const ALL: [&Library; 2] = [&MUJOCO, &TORCH];
 
 impl Library {
-    /// Where set-up lays this library out.
+    /// Folder into which set-up lays this library out.
     pub fn path(&self) -> PathBuf {
         repository().join(".native").join(self.folder)
     }
 
-    /// What the stamp file of a complete layout says: every pin it was made from.
+    /// Text of the stamp file of a complete layout: every pin from which it was made.
     pub fn stamp(&self) -> String {
         self.wheels
             .iter()
@@ -117,10 +117,10 @@ impl Library {
             .collect()
     }
 
-    /// The installation that the user chose through the environment, where there is one.
+    /// The installation that the user chose through the environment, if any.
     ///
-    /// Cargo's own `[env]` table sets the same variable to [`Library::path`];
-    /// only another value is the user's.
+    /// Cargo's own `[env]` table sets the same variable to [`Library::path`]; only another value
+    /// comes from the user.
     pub fn chosen(&self) -> Option<String> {
         if let Some(variable) = self.elsewhere
             && env::var_os(variable).is_some()
@@ -133,7 +133,7 @@ impl Library {
     }
 }
 
-/// The target folder, in which this program lies.
+/// The target folder, which holds this program.
 pub fn target() -> Result<PathBuf> {
     let own = std::env::current_exe().context("cannot tell where this program lies")?;
     let folder = own.ancestors().nth(2).context("no target folder")?;
@@ -142,14 +142,14 @@ pub fn target() -> Result<PathBuf> {
 
 /// Root of the repository.
 ///
-/// Cargo tells at run time; a binary run by hand falls back on where it was built.
+/// Cargo gives it at run time. A binary that is started by hand uses the place where it was built.
 pub fn repository() -> PathBuf {
     let manifest = env::var_os("CARGO_MANIFEST_DIR")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
     manifest.parent().map_or(manifest.clone(), Path::to_owned)
 }
 
-/// Whether two paths name one folder, which need not exist.
+/// Whether two paths name the same folder, which need not exist.
 fn same(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,

@@ -11,7 +11,7 @@ pub fn run() -> Result<bool> {
     Ok(stages.finish())
 }
 
-/// Adds the lint stages to a run; a failed one does not stop the next.
+/// Adds the lint stages to a run; a failed stage does not stop the next one.
 pub fn stages_of_lint(stages: &mut Stages) -> Result<()> {
     stages.cargo("format", &["fmt", "--all", "--check"], &[])?;
     let clippy = ["clippy", "--workspace", "--all-targets", ALL_FEATURES];

@@ -1,9 +1,9 @@
 //! Developer entry of the repository: `cargo xtask <subcommand>`.
 //!
-//! One file a subcommand. This crate links no native library, because it is
-//! what fetches them.
+//! Each subcommand has a file of its own. This crate links no native library, because it fetches
+//! them.
 
-// A developer tool talks to the terminal.
+// A developer tool prints to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs one subcommand; false where it ran and found something wrong.
+/// Runs one subcommand; false if it ran and found a problem.
 fn run(arguments: &[String]) -> Result<bool> {
     let Some((subcommand, rest)) = arguments.split_first() else {
         bail!("no subcommand\n{HELP}");

@@ -1,7 +1,7 @@
-//! `cargo xtask miri`: the engine ABI's unsafe code under Miri, where a toolchain has it.
+//! `cargo xtask miri`: runs the engine ABI's unsafe code under Miri, if a toolchain has it.
 //!
-//! What runs is the crate's unit tests and its tests in one process: a Rust engine
-//! out through its table and in again. Loading a library is beyond Miri.
+//! It runs the crate's unit tests and its tests in one process, in which a Rust engine goes out
+//! through its table and comes in again. Miri cannot load a library.
 
 use std::process::{Command, Stdio};
 
@@ -13,17 +13,17 @@ use crate::stage::Stages;
 /// Toolchains that may have Miri: the one in use, then the nightly one.
 const TOOLCHAINS: [&[&str]; 2] = [&[], &["+nightly"]];
 
-/// Files are read, and arithmetic is compared to the bit.
+/// Miri reads files, and arithmetic is compared to the bit.
 const FLAGS: &str = "-Zmiri-disable-isolation -Zmiri-deterministic-floats";
 
-/// Runs Miri; a machine without it is told so, and that is no failure.
+/// Runs Miri. A machine without it gets a message; this is no failure.
 pub fn run() -> Result<bool> {
     let mut stages = Stages::default();
     stage(&mut stages)?;
     Ok(stages.finish())
 }
 
-/// Adds the run to others.
+/// Adds the run to other stages.
 pub fn stage(stages: &mut Stages) -> Result<()> {
     let Some(toolchain) = TOOLCHAINS.into_iter().find(|t| is_ready(t)) else {
         stages.leave_out(
@@ -45,7 +45,7 @@ pub fn stage(stages: &mut Stages) -> Result<()> {
     Ok(())
 }
 
-/// Whether a toolchain has Miri, and can build the library it runs on.
+/// Whether a toolchain has Miri and can build its standard library.
 fn is_ready(toolchain: &[&str]) -> bool {
     let status = cargo(toolchain)
         .args(["miri", "setup"])
@@ -55,8 +55,9 @@ fn is_ready(toolchain: &[&str]) -> bool {
     status.is_ok_and(|s| s.success())
 }
 
-/// The `cargo` that picks toolchains, not the one that runs this program; in a
-/// target folder of its own, for the two would rebuild each other's work.
+/// The `cargo` that selects toolchains, not the one that runs this program.
+///
+/// It has a target folder of its own, because the two would rebuild each other's work.
 fn cargo(toolchain: &[&str]) -> Command {
     let mut command = Command::new("cargo");
     for name in ["CARGO", "RUSTUP_TOOLCHAIN", "RUSTC", "RUSTDOC"] {

@@ -1,4 +1,5 @@
-//! The Python side of `cargo xtask bench --peers`: a virtual environment of its own, 2.3 GB of packages.
+//! The Python side of `cargo xtask bench --peers`: a virtual environment of its own, 2.3 GB of
+//! packages.
 
 use std::path::{Path, PathBuf};
 
@@ -7,10 +8,10 @@ use anyhow::Result;
 use crate::environment;
 use crate::library::repository;
 
-/// The Python of an environment in `folder` that has every pinned package.
+/// The Python of an environment in `folder` with every pinned package.
 ///
 /// # Errors
-/// When there is no Python with pip, or a package cannot be had.
+/// If there is no Python with pip, or if a package is not available.
 pub fn environment(folder: &Path) -> Result<PathBuf> {
     let list = repository().join("bench/peers/requirements.txt");
     environment::of(folder, &list, "2.3 GB; 4.2 GB laid out")
@@ -28,7 +29,7 @@ mod tests {
         environment::tests::assert_pinned(&list, &["mujoco", "stable-baselines3", "torch"]);
     }
 
-    /// Both sides run the same engine.
+    /// Both sides must run the same engine.
     #[test]
     fn the_peer_has_the_version_of_mujoco_that_is_linked() {
         let list = repository().join("bench/peers/requirements.txt");

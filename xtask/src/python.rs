@@ -1,9 +1,10 @@
 //! `cargo xtask wheel`: the Python package as a wheel, and `cargo xtask python`: its tests.
 //!
-//! The wheel holds the module `asid._native`, which maturin builds, and beside it, in `asid/bin`, the program and MuJoCo's
-//! library: module and program look for it there. Bundled, the library is the one that this version was tested with,
-//! whatever version of the package `mujoco` a user has or wants: the library's name has its version, so that both can be
-//! loaded side by side. maturin's own bundling is left out, since it would add the library a second time.
+//! The wheel holds the module `asid._native`, which maturin builds. Beside it, in `asid/bin`, are
+//! the program and MuJoCo's library; module and program look for it there. The bundled library is
+//! the one with which this version was tested, whatever version of the package `mujoco` a user has.
+//! Its name contains its version, so both can be loaded side by side. maturin's own bundling is
+//! off, since it would add the library a second time.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,12 +16,12 @@ use crate::library::{MUJOCO, repository, target};
 use crate::stage::{SHARED, Stages};
 use crate::{environment, setup};
 
-/// How the code is optimised.
+/// Build profile.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Profile {
-    /// As the tests are, whose dependencies it has in common.
+    /// Profile of the tests, with which it shares the dependencies.
     Dev,
-    /// As a user wants it.
+    /// Profile for users.
     Release,
 }
 
@@ -41,7 +42,7 @@ impl Profile {
     }
 }
 
-/// Builds a wheel and says where it is.
+/// Builds a wheel and prints its path.
 pub fn wheel(arguments: &[String]) -> Result<bool> {
     if let Some(argument) = arguments.first() {
         bail!("unexpected argument `{argument}`; this subcommand takes none");
@@ -64,7 +65,7 @@ pub fn tests(arguments: &[String]) -> Result<bool> {
     Ok(stages.finish())
 }
 
-/// Adds the package's tests to others: the wheel in a fresh environment, and pytest in it.
+/// Adds the package's tests to other stages: the wheel in a fresh environment, and pytest in it.
 pub fn stage(stages: &mut Stages, profile: Profile) -> Result<()> {
     let built = match maturin().and_then(|_| fresh()) {
         Ok(python) => python,
@@ -89,7 +90,7 @@ pub fn stage(stages: &mut Stages, profile: Profile) -> Result<()> {
         let status = Command::new(&built)
             .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
             .arg(repository().join("python/tests"))
-            // Not the repository's folder: `asid` is what was installed.
+            // Outside the repository's folder, so that `asid` is the installed package.
             .current_dir(target()?)
             .env_remove("ASID")
             .env("ASID_REPOSITORY", repository())
@@ -100,19 +101,19 @@ pub fn stage(stages: &mut Stages, profile: Profile) -> Result<()> {
     Ok(())
 }
 
-/// The Python that has what the tests need.
+/// The Python with the packages of the tests.
 fn fresh() -> Result<PathBuf> {
     let list = repository().join("python/tests/requirements.txt");
     environment::of(&target()?.join("python/tests"), &list, "58 MB")
 }
 
-/// The Python that has maturin.
+/// The Python with maturin.
 fn maturin() -> Result<PathBuf> {
     let list = repository().join("python/requirements-build.txt");
     environment::of(&target()?.join("python/build"), &list, "11 MB")
 }
 
-/// Builds the wheel: first the program, then the module with what lies in its folder.
+/// Builds the wheel: first the program, then the module, which includes the program's folder.
 fn build(profile: Profile) -> Result<PathBuf> {
     setup::run(&[&MUJOCO])?;
     let python = maturin()?;
@@ -141,10 +142,10 @@ fn build(profile: Profile) -> Result<PathBuf> {
     wheel.with_context(|| format!("maturin wrote no wheel into {}", out.display()))
 }
 
-/// Builds the program, and puts it with MuJoCo's library where the wheel has them.
+/// Builds the program and copies it, with MuJoCo's library, into the wheel's folder.
 fn program(profile: Profile) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    // The features of the tests but for libtorch, whose 500 MB no wheel is to carry.
+    // The features of the tests without libtorch, whose 500 MB are too large for a wheel.
     let status = Command::new(cargo)
         .args(["build", "--package=asid", "--package=asid-python", SHARED])
         .args(["--bin=asid", "--features=mujoco,logs", "--locked"])
@@ -164,7 +165,7 @@ fn program(profile: Profile) -> Result<()> {
     let built = target()?.join(profile.folder()).join("asid");
     let program = folder.join("asid");
     copy(&built, &program)?;
-    // What debuggers read is most of the file. Without the tool the wheel is larger, and no worse.
+    // Debug symbols are most of the file. Without the tool `strip` the wheel is only larger.
     let _ = Command::new("strip").arg(&program).status();
     let library = format!("libmujoco.so.{}", MUJOCO.wheels[0].version);
     let from = MUJOCO

@@ -1,8 +1,9 @@
 //! `cargo xtask same OLD NEW`: whether two builds of `asid` give the same results, to the bit.
 //!
-//! For changes that are meant to change no result: runs of every task on every engine, a comparison, a
-//! diagnosis of every study, and conformance, with searches as small as they can be. What two runs of
-//! one build differ in is passed over: times, versions and the command line.
+//! It checks changes that are meant to change no result. It compares runs of every task on every
+//! engine, a comparison, a diagnosis of every study, and conformance, all with the smallest
+//! searches. It ignores what differs between two runs of one build: times, versions and the command
+//! line.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,7 @@ use serde_json::Value;
 
 use crate::library::repository;
 
-/// Keys whose values are not of the result.
+/// Keys whose values are not part of the result.
 const APART: [&str; 7] = [
     "wall_s",
     "seconds",
@@ -24,7 +25,7 @@ const APART: [&str; 7] = [
     "command",
 ];
 
-/// The smallest searches: the paths through the code are those of long ones.
+/// Settings of the smallest searches; these take the same code paths as long ones.
 const TINY: [&str; 11] = [
     "explorer.iterations=1",
     "explorer.population=4",
@@ -39,10 +40,10 @@ const TINY: [&str; 11] = [
     "expected.rounds=0",
 ];
 
-/// Differences of a result that are told, at most.
+/// Maximum number of differences of a result that are shown.
 const TOLD: usize = 5;
 
-/// Compares two builds; false where a result differs.
+/// Compares two builds; false if a result differs.
 pub fn run(arguments: &[String]) -> Result<bool> {
     let [old, new] = arguments else {
         bail!("`same` takes two programs, the old build and the new one");
@@ -87,7 +88,7 @@ pub fn run(arguments: &[String]) -> Result<bool> {
     Ok(all_same)
 }
 
-/// Names and arguments of all that is compared; `program` says which tasks and engines there are.
+/// Names and arguments of all compared commands; `program` lists the tasks and engines.
 fn commands(program: &Path) -> Result<Vec<(String, Vec<String>)>> {
     let listed = output(program, &["list", "--json"])?;
     let rows: Vec<Value> = serde_json::from_str(&listed)?;
@@ -133,13 +134,13 @@ fn commands(program: &Path) -> Result<Vec<(String, Vec<String>)>> {
     Ok(all)
 }
 
-/// What a program prints.
+/// Output of a program.
 fn output(program: &Path, arguments: &[&str]) -> Result<String> {
     let done = Command::new(program).args(arguments).output()?;
     Ok(String::from_utf8(done.stdout)?)
 }
 
-/// The numbers of a command's `result.json`, by their places in it.
+/// The values in a command's `result.json`, by their paths.
 fn result(program: &Path, command: &[String], out: &Path) -> Result<BTreeMap<String, String>> {
     let done = Command::new(program)
         .args(command)
@@ -159,7 +160,7 @@ fn result(program: &Path, command: &[String], out: &Path) -> Result<BTreeMap<Str
     Ok(found)
 }
 
-/// Every value of a document by its place.
+/// Collects every value of a document by its path.
 fn flatten(value: &Value, place: String, found: &mut BTreeMap<String, String>) {
     match value {
         Value::Object(fields) => {
@@ -178,7 +179,7 @@ fn flatten(value: &Value, place: String, found: &mut BTreeMap<String, String>) {
     }
 }
 
-/// The first places at which two results differ.
+/// The first paths at which two results differ.
 fn differences(old: &BTreeMap<String, String>, new: &BTreeMap<String, String>) -> Vec<String> {
     let mut places: Vec<&String> = old.keys().chain(new.keys()).collect();
     places.sort();

@@ -1,8 +1,7 @@
 //! `cargo xtask setup`: lays the native libraries out under `.native/`.
 //!
-//! A library appears whole or not at all: it is put together in a folder beside
-//! its place and renamed. A stamp with the pins makes the next call quick and
-//! notices a pin that has changed.
+//! A library appears completely or not at all: it is assembled in a folder beside its place, which
+//! is then renamed. A stamp with the pins makes the next call quick and reveals a changed pin.
 
 use std::fs;
 use std::path::Path;
@@ -12,10 +11,10 @@ use anyhow::{Context, Result, bail};
 
 use crate::library::{ALL, Library};
 
-/// File in a library's folder that lists the pins it was made from.
+/// File in a library's folder that lists the pins from which it was made.
 const STAMP: &str = ".pins";
 
-/// The libraries that the arguments of `setup` ask for.
+/// The libraries that the arguments of `setup` name.
 pub fn selection(arguments: &[String]) -> Result<Vec<&'static Library>> {
     let known = ALL.map(|l| l.name).join(", ");
     let name = match arguments {
@@ -31,7 +30,7 @@ pub fn selection(arguments: &[String]) -> Result<Vec<&'static Library>> {
     }
 }
 
-/// Sets up each of `libraries` and says in one line what is used.
+/// Sets up each of `libraries` and prints in one line what is used.
 pub fn run(libraries: &[&'static Library]) -> Result<()> {
     for library in libraries {
         let place = library.path();
@@ -48,10 +47,10 @@ pub fn run(libraries: &[&'static Library]) -> Result<()> {
     Ok(())
 }
 
-/// Lays `library` out in `place`; false where it is there already.
+/// Lays `library` out in `place`; false if it is already there.
 ///
 /// # Errors
-/// On another platform than that of the pins, and where a file cannot be had.
+/// If the platform is not that of the pins, or if a file is not available.
 pub fn lay_out(library: &Library, place: &Path) -> Result<bool> {
     if is_complete(library, place) {
         return Ok(false);
@@ -61,7 +60,7 @@ pub fn lay_out(library: &Library, place: &Path) -> Result<bool> {
     Ok(true)
 }
 
-/// A library that the user chose must hold what the build will look for.
+/// Checks that a library chosen by the user has the file that the build needs.
 fn check_chosen(library: &Library, chosen: &str) -> Result<()> {
     let elsewhere = chosen.starts_with('$');
     if !elsewhere && !Path::new(chosen).join(library.landmark).exists() {
@@ -74,7 +73,7 @@ fn check_chosen(library: &Library, chosen: &str) -> Result<()> {
     Ok(())
 }
 
-/// The pinned files are those of Linux on x86-64.
+/// Refuses platforms other than Linux on x86-64, to which the pinned files belong.
 fn check_platform(library: &Library, os: &str, arch: &str) -> Result<()> {
     if (os, arch) != ("linux", "x86_64") {
         bail!(
@@ -115,12 +114,13 @@ fn install(library: &Library, place: &Path) -> Result<()> {
         replace(&tree, place)
     };
     let outcome = work();
-    // Nothing half done stays behind, whatever happened.
+    // Remove the partial folder in any case.
     let _ = fs::remove_dir_all(&partial);
     outcome
 }
 
-/// Removes what set-ups that were interrupted left: folders named after a process that is gone.
+/// Removes folders that interrupted set-ups left: those named after a process that no longer
+/// exists.
 fn remove_abandoned(parent: &Path, prefix: &str) {
     let Ok(entries) = fs::read_dir(parent) else {
         return;
@@ -146,7 +146,7 @@ fn finish(library: &Library, tree: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Puts `tree` where `place` is; an older layout is removed first.
+/// Moves `tree` to `place`; removes an older layout first.
 fn replace(tree: &Path, place: &Path) -> Result<()> {
     if place.exists() {
         fs::remove_dir_all(place).with_context(|| place.display().to_string())?;
@@ -190,7 +190,7 @@ mod tests {
         }
     }
 
-    /// The layout of torch is finished by a linker script, that of MuJoCo by a link.
+    /// A linker script completes the layout of torch, a link that of MuJoCo.
     #[test]
     fn a_finished_tree_is_complete_until_a_pin_changes() {
         let folder = tempfile::tempdir().unwrap();
@@ -231,7 +231,7 @@ mod tests {
     fn only_what_a_dead_process_left_is_removed() {
         let folder = tempfile::tempdir().unwrap();
         let alive = folder.path().join(format!(".x.partial-{}", process::id()));
-        // Above the largest process id that Linux gives.
+        // Larger than the largest process id of Linux.
         let dead = folder.path().join(".x.partial-99999999");
         let other = folder.path().join("libtorch");
         for path in [&alive, &dead, &other] {

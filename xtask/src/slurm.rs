@@ -1,8 +1,8 @@
 //! `cargo xtask slurm`: comparisons as job arrays of a real Slurm with two nodes on this host.
 //!
-//! What a job array promises is tested where it must hold: shares that two nodes write into one
-//! folder give the bytes of one process; a task that is killed, one that is queued again, and one
-//! that is warned before its time limit lose no finished run.
+//! It tests the promises of a job array under real conditions. Two nodes that write shares into one
+//! folder must give the same bytes as one process. A task that is killed, requeued, or warned
+//! before its time limit must not lose a finished run.
 
 mod cluster;
 mod comparison;
@@ -16,7 +16,7 @@ use crate::library::{repository, target};
 use crate::stage::{ALL_FEATURES, Stages};
 use cluster::{Cluster, Programs};
 
-/// Runs the stage alone. `--program FILE` tests a program that is built already.
+/// Runs the stage alone. `--program FILE` tests a program that is already built.
 pub fn run(arguments: &[String]) -> Result<bool> {
     let program = match arguments {
         [] => None,
@@ -28,7 +28,7 @@ pub fn run(arguments: &[String]) -> Result<bool> {
     Ok(stages.finish())
 }
 
-/// Runs the stage, or says why it is left out.
+/// Runs the stage, or prints why it is left out.
 pub fn stage(stages: &mut Stages, program: Option<&Path>) -> Result<()> {
     let programs = match Programs::get() {
         Ok(programs) => programs,
@@ -49,7 +49,7 @@ pub fn stage(stages: &mut Stages, program: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// The program, built as the tests build it.
+/// Builds the program as the tests build it.
 fn build() -> Result<PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let built = Command::new(cargo)
@@ -63,7 +63,7 @@ fn build() -> Result<PathBuf> {
     Ok(target()?.join("debug").join("asid"))
 }
 
-/// Every check; true where all hold. What the cluster said is shown where one does not.
+/// Runs every check; returns whether all hold. Shows the cluster's logs if one fails.
 fn test(programs: &Programs, program: &Path) -> Result<bool> {
     let cluster = Cluster::start(programs)?;
     let checked = comparison::check(&cluster, program);

@@ -7,10 +7,13 @@ use anyhow::{Context, Result};
 
 use crate::library::repository;
 
-/// Features that bring in every engine and the networks.
+/// Features with every engine and the networks.
 pub const ALL_FEATURES: &str = "--features=mujoco,torch,logs";
 
-/// Named beside a part of the workspace, it gives the part the third-party crates of the whole, which are built once.
+/// Package argument with which a part of the workspace uses the whole workspace's third-party
+/// crates.
+///
+/// These are then built only once.
 pub const SHARED: &str = "--package=asid-third-party";
 
 /// How a stage ended.
@@ -18,18 +21,18 @@ pub const SHARED: &str = "--package=asid-third-party";
 enum Outcome {
     Passed,
     Failed,
-    /// It could not be run here, which is no failure.
+    /// It could not run here, which is no failure.
     LeftOut,
 }
 
-/// Stages that have run, in order.
+/// Finished stages, in order.
 #[derive(Default)]
 pub struct Stages {
     done: Vec<(String, Outcome, Duration)>,
 }
 
 impl Stages {
-    /// Runs `work` as a stage; true where it succeeded.
+    /// Runs `work` as a stage; true if it succeeds.
     pub fn run(&mut self, name: &str, work: impl FnOnce() -> Result<bool>) -> Result<bool> {
         eprintln!("==> {name}");
         let start = Instant::now();
@@ -43,7 +46,7 @@ impl Stages {
         Ok(passed)
     }
 
-    /// Notes that a stage could not be run here, and says why.
+    /// Records that a stage could not run here, with the reason.
     pub fn leave_out(&mut self, name: &str, reason: &str) {
         eprintln!("==> {name}: left out: {reason}");
         let entry = (name.to_owned(), Outcome::LeftOut, Duration::ZERO);
@@ -64,7 +67,7 @@ impl Stages {
         })
     }
 
-    /// The summary: one line a stage, then the whole; true where all passed.
+    /// Prints the summary: one line per stage, then the total. True if all passed.
     pub fn finish(&self) -> bool {
         eprint!("\n{}", self.summary());
         self.passed()

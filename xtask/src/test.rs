@@ -1,5 +1,7 @@
-//! `cargo xtask test`: set-up, lints, dependencies, every test, the pure Rust build, a real Slurm, Miri, and the Python
-//! package, with one summary. CI runs this.
+//! `cargo xtask test`: set-up, lints, dependencies, every test, the pure Rust build, a real Slurm,
+//! Miri, and the Python package, with one summary.
+//!
+//! CI runs this.
 
 use anyhow::Result;
 
@@ -7,20 +9,23 @@ use crate::lint::stages_of_lint;
 use crate::stage::{SHARED, Stages};
 use crate::{binaries, deny, library, miri, python, setup, slurm};
 
-/// Tests of the command line that call every stage of the pipeline, and what this build refuses.
+/// Tests of the command line that call every stage of the pipeline, and of what the pure build
+/// refuses.
 const PURE: [&str; 2] = ["--test=cli_run", "--test=cli_refusals"];
 
-/// Runs everything; without the native libraries nothing else can be built.
+/// Runs all stages; without the native libraries the other stages cannot be built.
 pub fn run() -> Result<bool> {
     let mut stages = Stages::default();
     stages.run("setup", || setup::run(&library::ALL).map(|()| true))?;
     stages_of_lint(&mut stages)?;
     deny::stage(&mut stages)?;
     stages.run("tests", binaries::run)?;
-    // The program that the tests have built: alone it would be built anew, with other features of its dependencies.
+    // The program that the tests have built. A separate build would have other features of its
+    // dependencies.
     let program = library::target()?.join("debug/asid");
     slurm::stage(&mut stages, Some(&program))?;
-    // After what calls the program that the tests have built, whose place this one takes.
+    // This stage replaces the program that the tests have built, so it comes after the stages that
+    // call it.
     let pure = ["test", "--package=asid", SHARED, "--no-fail-fast"];
     stages.cargo("tests, default features", &[&pure[..], &PURE].concat(), &[])?;
     miri::stage(&mut stages)?;

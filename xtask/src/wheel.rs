@@ -1,4 +1,4 @@
-//! A pinned wheel: fetched by pip, checked against its hash, opened as the zip file it is.
+//! A pinned wheel: pip fetches it, its hash is checked, and it is opened as a zip file.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -16,18 +16,18 @@ pub struct Wheel {
     pub version: &'static str,
     /// SHA-256 of the file, in lower-case hexadecimal.
     pub sha256: &'static str,
-    /// What is taken out of it.
+    /// Members that are extracted.
     pub members: &'static [Member],
 }
 
-/// A file or a folder inside a wheel, and its place in the library's folder.
+/// A file or folder inside a wheel, and its place in the library's folder.
 pub struct Member {
     from: &'static str,
     to: &'static str,
 }
 
 impl Member {
-    /// One file.
+    /// A single file.
     pub const fn file(from: &'static str, to: &'static str) -> Self {
         Self { from, to }
     }
@@ -37,7 +37,7 @@ impl Member {
         Self { from, to }
     }
 
-    /// Where `name` of the archive goes, if it belongs to this member.
+    /// Destination of `name` of the archive, if it belongs to this member.
     fn destination(&self, name: &str) -> Option<String> {
         if self.from.ends_with('/') {
             let rest = name.strip_prefix(self.from)?;
@@ -47,8 +47,7 @@ impl Member {
     }
 }
 
-/// Platform tags under which the pinned files are published: pip takes a file
-/// only if one of its tags is in this list.
+/// Platform tags of the pinned files: pip takes a file only if one of its tags is in this list.
 const PLATFORMS: [&str; 7] = [
     "manylinux_2_28_x86_64",
     "manylinux_2_27_x86_64",
@@ -60,10 +59,10 @@ const PLATFORMS: [&str; 7] = [
 ];
 
 impl Wheel {
-    /// Downloads the wheel into `folder` and returns its path once the hash is right.
+    /// Downloads the wheel into `folder`, checks the hash and returns its path.
     ///
-    /// The Python version and platforms are given, so that the file, and with it
-    /// the hash, is the same whatever Python the user has.
+    /// Python version and platforms are given, so that the file and its hash do not depend on the
+    /// user's Python.
     pub fn fetch(&self, folder: &Path) -> Result<PathBuf> {
         let requirement = format!("{}=={}", self.project, self.version);
         let mut command = Command::new(python()?);
@@ -163,7 +162,7 @@ fn sha256(path: &Path) -> Result<String> {
         .collect())
 }
 
-/// The Python that has pip: `python3`, else `python`.
+/// The Python with pip: `python3`, else `python`.
 pub fn python() -> Result<&'static str> {
     for name in ["python3", "python"] {
         let answer = Command::new(name)
@@ -181,7 +180,7 @@ pub fn python() -> Result<&'static str> {
     )
 }
 
-/// One line out of what pip said, and what to do about it.
+/// One line from pip's output, and advice for the user.
 pub fn pip_failure(said: &str) -> String {
     let network = [
         "NewConnectionError",
@@ -190,7 +189,7 @@ pub fn pip_failure(said: &str) -> String {
         "name resolution",
         "ProxyError",
         "SSLError",
-        // Not one file of the project was seen: no index, or an empty folder.
+        // pip saw no file of the project: there is no index, or the folder is empty.
         "(from versions: none)",
     ];
     if network.iter().any(|sign| said.contains(sign)) {
@@ -206,7 +205,7 @@ pub fn pip_failure(said: &str) -> String {
     format!("pip failed: {}", line.trim_start_matches("ERROR: "))
 }
 
-/// The single `.whl` in a folder that pip has just written to.
+/// The only `.whl` in a folder into which pip has just written.
 fn only_wheel(folder: &Path) -> Result<PathBuf> {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
@@ -280,7 +279,7 @@ mod tests {
         assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
     }
 
-    /// A program can be started as it comes out of its wheel; other files cannot.
+    /// The extracted program must be executable; other files must not.
     #[cfg(unix)]
     #[test]
     fn a_program_can_be_started() {

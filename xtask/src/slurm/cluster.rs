@@ -1,4 +1,5 @@
-//! A Slurm of its own: Debian's packages unpacked, nothing installed, no privilege needed.
+//! A private Slurm: Debian's packages are unpacked; nothing is installed and no privilege is
+//! needed.
 
 use std::fs;
 use std::io::Read as _;
@@ -13,7 +14,7 @@ use tempfile::TempDir;
 
 use crate::library::repository;
 
-/// What is fetched; 3.8 MB.
+/// Packages that are fetched; 3.8 MB.
 const PACKAGES: [&str; 12] = [
     "slurmd",
     "slurmctld",
@@ -32,10 +33,10 @@ const PACKAGES: [&str; 12] = [
 /// Names of the nodes, one processor each.
 pub const NODES: [&str; 2] = ["n1", "n2"];
 
-/// Longest that the daemons may take to find each other.
+/// Maximum time that the daemons may take to connect.
 const START: Duration = Duration::from_secs(60);
 
-/// Bytes of munge's key: the most that it takes.
+/// Bytes of munge's key: the most that it accepts.
 const KEY: usize = 1024;
 
 /// The unpacked packages.
@@ -46,10 +47,10 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Fetches and unpacks the packages into `.native/slurm`, or finds them there.
+    /// Finds the unpacked packages in `.native/slurm`, or fetches and unpacks them there.
     ///
     /// # Errors
-    /// When they cannot be had, with the reason.
+    /// If they are not available, with the reason.
     pub fn get() -> Result<Self> {
         let folder = repository().join(".native").join("slurm");
         let root = folder.join("root");
@@ -76,7 +77,8 @@ impl Programs {
         Ok(Self { root, plugins })
     }
 
-    /// A program of the packages, with its libraries and the cluster's settings.
+    /// A command that runs a program of the packages, with its libraries and the cluster's
+    /// settings.
     fn command(&self, program: &str, config: &Path) -> Command {
         let mut command = Command::new(self.root.join("usr").join(program));
         self.environment(&mut command, config);
@@ -97,7 +99,7 @@ impl Programs {
     }
 }
 
-/// `apt-get download`, by whatever the system knows of packages.
+/// Runs `apt-get download` with the system's package sources.
 fn download(folder: &Path) -> Result<()> {
     let fetched = Command::new("apt-get")
         .args(["download", "-q"])
@@ -120,11 +122,11 @@ fn succeeded(what: &str, output: std::io::Result<Output>) -> Result<()> {
     Ok(())
 }
 
-/// A running cluster: one controller, two nodes. It ends when it is dropped.
+/// A running cluster with one controller and two nodes. Dropping it ends it.
 pub struct Cluster<'p> {
     programs: &'p Programs,
     folder: TempDir,
-    /// munge's socket must lie where everybody may look.
+    /// munge's socket must be in a folder that everybody can read.
     _socket: TempDir,
     daemons: Vec<Child>,
 }
@@ -133,7 +135,7 @@ impl<'p> Cluster<'p> {
     /// Starts the daemons and waits until both nodes are idle.
     ///
     /// # Errors
-    /// When one of them does not start.
+    /// If one of them does not start.
     pub fn start(programs: &'p Programs) -> Result<Self> {
         let (folder, socket) = (tempfile::tempdir()?, tempfile::tempdir()?);
         for open in [&folder, &socket] {
@@ -189,12 +191,12 @@ impl<'p> Cluster<'p> {
         Ok(cluster)
     }
 
-    /// A file of the cluster's folder.
+    /// Path of a file in the cluster's folder.
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Where tests work.
+    /// Working folder of the tests.
     pub fn work(&self) -> PathBuf {
         self.path("work")
     }
@@ -227,10 +229,10 @@ impl<'p> Cluster<'p> {
         Ok(())
     }
 
-    /// What a command of Slurm prints.
+    /// Output of a Slurm command.
     ///
     /// # Errors
-    /// When it fails.
+    /// If it fails.
     pub fn slurm(&self, program: &str, arguments: &[&str]) -> Result<String> {
         let mut command = self
             .programs
@@ -243,7 +245,7 @@ impl<'p> Cluster<'p> {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
     }
 
-    /// A program that finds the cluster's commands.
+    /// A command that runs a program which finds the cluster's commands.
     pub fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);
         self.programs
@@ -252,9 +254,9 @@ impl<'p> Cluster<'p> {
         command
     }
 
-    /// The ends of the daemons' logs.
+    /// The last lines of the daemons' logs.
     pub fn logs(&self) -> String {
-        /// Lines of each that are shown.
+        /// Lines of each log that are shown.
         const LINES: usize = 15;
         let entries = fs::read_dir(self.path("log")).into_iter().flatten();
         let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
@@ -274,7 +276,7 @@ impl Drop for Cluster<'_> {
     fn drop(&mut self) {
         let _ = self.slurm("scancel", &["--state=RUNNING"]);
         let _ = self.slurm("scancel", &["--state=PENDING"]);
-        // Nodes before their controller, munge last.
+        // End the nodes before their controller, munge last.
         for daemon in self.daemons.iter_mut().rev() {
             let _ = Command::new("kill").arg(daemon.id().to_string()).status();
             let begun = Instant::now();
@@ -290,14 +292,14 @@ impl Drop for Cluster<'_> {
     }
 }
 
-/// `slurm.conf`: two nodes of one processor on this host, on ports that are free.
+/// `slurm.conf`: two nodes with one processor each on this host, on free ports.
 fn configuration(programs: &Programs, folder: &Path, munge: &Path) -> Result<String> {
     let word = |program: &str, argument: &[&str]| -> Result<String> {
         let output = Command::new(program).args(argument).output()?;
         Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     let (host, user) = (word("hostname", &[])?, word("id", &["-un"])?);
-    // Held all at once, so that they differ.
+    // All listeners are held at the same time, so that their ports differ.
     let free: Vec<TcpListener> = (0..3)
         .map(|_| TcpListener::bind(("127.0.0.1", 0)))
         .collect::<std::io::Result<_>>()?;

@@ -1,4 +1,4 @@
-//! What a comparison as a job array promises.
+//! Checks the promises of a comparison that runs as a job array.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::cluster::{Cluster, NODES};
 
-/// Files that are the same however a comparison came about.
+/// Files that must be the same, however the comparison was run.
 const SAME: [&str; 5] = [
     "result.json",
     "runs.json",
@@ -19,34 +19,35 @@ const SAME: [&str; 5] = [
     "config.toml",
 ];
 
-/// A comparison whose runs last a moment; its figures mean nothing.
+/// A comparison with very short runs; its figures mean nothing.
 const TINY: &str = "compare rod-balancing --backend rapier --method random --method dr \
     --condition left --seeds 3 --set identifier.iterations=1 --set identifier.population=8 \
     --set identifier.sampling.rounds=1 --set identifier.sampling.draws=8 --set solver.iterations=1 \
     --set solver.population=2 --set solver.belief_samples=1";
 
-/// What makes a task of its array last some seconds.
+/// Settings that make a task of the array last a few seconds.
 const BRIEF: &[&str] = &["--set", "expected.rounds=1"];
 
-/// What makes a task of its array last longer than the half minute after which Slurm looks at the time limits of its jobs.
+/// Settings that make a task of the array outlast the half minute after which Slurm checks time
+/// limits.
 const LONG: &[&str] = &["--set", "expected.rounds=7"];
 
-/// Runs of [`TINY`].
+/// Number of runs of [`TINY`].
 const RUNS: usize = 6;
 
-/// Tasks of its array: one a node.
+/// Number of tasks of its array: one per node.
 const TASKS: usize = 2;
 
-/// Longest that an array may take.
+/// Maximum time that an array may take.
 const LIMIT: Duration = Duration::from_secs(400);
 
-/// How long a task that was queued again is left alone: its node must have ended it first.
+/// Time for which a requeued task is left alone, because its node must end it first.
 const AGAIN: Duration = Duration::from_secs(10);
 
 /// Checks everything.
 ///
 /// # Errors
-/// With the first thing that does not hold.
+/// Returns the first promise that does not hold.
 pub fn check(cluster: &Cluster<'_>, program: &Path) -> Result<()> {
     let test = Test { cluster, program };
     let clock = Instant::now();
@@ -72,7 +73,7 @@ impl Test<'_> {
         self.cluster.work().join(name)
     }
 
-    /// Runs the comparison in a folder; what it prints.
+    /// Runs the comparison in a folder; returns its output.
     fn asid(&self, out: &str, more: &[&str]) -> Result<String> {
         let mut command = self.cluster.command(self.program);
         command.args(TINY.split_whitespace());
@@ -85,7 +86,7 @@ impl Test<'_> {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
     }
 
-    /// Submits the comparison; the array's number.
+    /// Submits the comparison; returns the number of the array.
     fn submit(&self, out: &str, options: &[&str]) -> Result<String> {
         let tasks = TASKS.to_string();
         let common = ["--submit", "slurm", "--jobs", &tasks];
@@ -99,7 +100,7 @@ impl Test<'_> {
         Ok(number.to_owned())
     }
 
-    /// Cells that are there.
+    /// The finished cells, with their modification times.
     fn cells(&self, out: &str) -> BTreeMap<String, SystemTime> {
         let entries = fs::read_dir(self.out(out).join("cells"))
             .into_iter()
@@ -115,7 +116,7 @@ impl Test<'_> {
         entries.filter_map(|e| of(e.ok()?)).collect()
     }
 
-    /// What the tasks of an array said.
+    /// Output of the tasks of an array.
     fn said(&self, out: &str) -> Result<String> {
         let mut text = String::new();
         for entry in fs::read_dir(self.out(out).join("slurm"))? {
@@ -139,11 +140,11 @@ impl Test<'_> {
         Ok(())
     }
 
-    /// Waits until no task of an array is left; those that are queued again begin soon.
+    /// Waits until no task of an array is left; makes requeued tasks begin soon.
     fn ended(&self, out: &str, array: &str) -> Result<()> {
         let waiting: RefCell<BTreeMap<String, Instant>> = RefCell::default();
         self.until(out, "end", || {
-            // A job that is gone is unknown after a while.
+            // Slurm forgets a finished job after a while.
             let arguments = ["--noheader", "--format=%i %t", "--jobs", array];
             let states = self.cluster.slurm("squeue", &arguments).unwrap_or_default();
             let mut waiting = waiting.borrow_mut();
@@ -167,7 +168,7 @@ impl Test<'_> {
         })
     }
 
-    /// Takes away the two minutes that Slurm lets a job wait that was queued again.
+    /// Removes the two minutes for which Slurm delays a requeued job.
     fn hurry(&self, job: &str) {
         let job = format!("JobId={job}");
         let _ = self
@@ -175,7 +176,7 @@ impl Test<'_> {
             .slurm("scontrol", &["update", &job, "StartTime=now"]);
     }
 
-    /// The folder holds what one process gave, to the byte.
+    /// Checks that the folder holds the same bytes as the result of one process.
     fn same(&self, out: &str, whole: &str) -> Result<()> {
         for file in SAME {
             let read = |folder: &str| {
@@ -196,7 +197,7 @@ impl Test<'_> {
         Ok(())
     }
 
-    /// None of these cells was made again.
+    /// Checks that none of these cells was computed again.
     fn kept(&self, out: &str, before: &BTreeMap<String, SystemTime>) -> Result<()> {
         let after = self.cells(out);
         for (name, time) in before {
@@ -234,7 +235,7 @@ impl Test<'_> {
             "the tasks ended before they could be stopped"
         );
         self.ended("killed", &array)?;
-        // The one that was queued again did its share; the killed one's is missing.
+        // The requeued task has finished its share; that of the killed task is missing.
         ensure!(
             !self.out("killed").join("result.json").exists(),
             "a killed task had ended"
@@ -245,7 +246,7 @@ impl Test<'_> {
         self.same("killed", "whole")
     }
 
-    /// The warning may come up to a minute early, so here it comes soon after the start.
+    /// Slurm may warn up to a minute early, so here the warning comes soon after the start.
     fn warned_before_the_limit(&self) -> Result<()> {
         self.asid("whole-long", LONG)?;
         let limit = ["--sbatch=--time=1", "--sbatch=--signal=B:USR1@57"];
