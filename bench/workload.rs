@@ -100,8 +100,8 @@ impl Episodes {
 }
 
 impl Workload {
-    /// The episodes as simulations: `copies` of each, with the unknowns `theta` (`episodes x copies
-    /// x d`).
+    /// The episodes as simulations: `copies` of each, with the unknowns `theta`
+    /// (`episodes x copies x d`).
     ///
     /// # Errors
     /// If the layout is not that of the task's scene.

@@ -1,18 +1,20 @@
-//! The border to readers of other crates: a check of theirs that fails on damaged bytes is an error here.
+//! Guards calls of other crates' readers: a panic on damaged bytes becomes an error.
 
 use std::panic::AssertUnwindSafe;
 
-/// Calls a reader of files that are `what`. Where it panics instead of returning an error, the file is damaged in a way that its
-/// authors did not think of; what it had read so far is dropped with the error.
+/// Calls a reader of files of kind `what`.
+///
+/// A panic means that the file is damaged in a way that the reader's authors did not consider. What
+/// it had read so far is dropped.
 ///
 /// # Errors
-/// What the reader says, and of a panic that the file is damaged.
+/// Returns the reader's error; after a panic, that the file is damaged.
 pub fn guarded<T>(what: &str, read: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     let read = std::panic::catch_unwind(AssertUnwindSafe(read));
     read.unwrap_or_else(|_| Err(format!("is {what} that is damaged, or none")))
 }
 
-/// A message of another crate, folded to one line.
+/// A message of another crate, joined to one line.
 #[must_use]
 pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

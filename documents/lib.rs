@@ -1,8 +1,8 @@
-//! Text that strangers wrote, read without harm.
+//! Reads untrusted text safely.
 //!
-//! A parser that follows elements or brackets by recursion ends the process where they have no end, and one that takes damaged
-//! bytes for sound ones panics. Here such a document is an error of one line: [`xml`], [`toml_text`], and [`guard`] about the readers of other
-//! crates.
+//! A recursive parser ends the process on endlessly nested elements or brackets, and a parser that
+//! trusts its input panics on damaged bytes. In this crate such a document gives a one-line error:
+//! [`xml`], [`toml_text`], and [`guard`] around the readers of other crates.
 
 pub mod guard;
 pub mod toml_text;

@@ -1,18 +1,20 @@
-//! TOML of files that a user names.
+//! TOML in files that a user names.
 //!
-//! The parser follows brackets inside of brackets by recursion before its own limit says no, so that a file of nothing but `[`
-//! would end the process by an overflow of the stack. They are counted before.
+//! The parser follows nested brackets by recursion before it applies its own limit. A file of
+//! nothing but `[` would end the process by a stack overflow. This module therefore counts the
+//! brackets first.
 
 use serde::de::{DeserializeOwned, Error as _};
 use toml::de::Error;
 
-/// Brackets that may be open at a time: the parser's own limit, which it applies to values after it has found them.
+/// Maximum number of open brackets: the parser's own limit, which it applies to values only after
+/// it has found them.
 const MAX_LEVELS: usize = 80;
 
 /// Reads a value.
 ///
 /// # Errors
-/// When the text is no TOML, is not such a value, or its brackets are nested without end.
+/// If the text is no TOML, is no such value, or nests its brackets endlessly.
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
     if levels(text) > MAX_LEVELS {
         let message = format!("brackets are nested deeper than {MAX_LEVELS}: is one not closed?");
@@ -21,7 +23,9 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
     toml::from_str(text)
 }
 
-/// The most brackets that are open at a time, outside of texts and comments; of what is no TOML at least as many as the parser follows.
+/// Maximum number of simultaneously open brackets, outside of strings and comments.
+///
+/// For text that is no TOML it is at least the number that the parser follows.
 fn levels(text: &str) -> usize {
     let (mut open, mut most) = (0_usize, 0);
     let mut rest = text;
@@ -45,7 +49,8 @@ fn levels(text: &str) -> usize {
     most
 }
 
-/// Length of the quoted text that `rest` begins with. One of a single line ends with its line, where its end mark is missing.
+/// Length of the quoted string at the start of `rest`. Without its end mark, a single-line string
+/// ends with its line.
 fn text_length(rest: &str) -> usize {
     let quote = &rest[..1];
     let (mark, single) = match rest.get(..3) {
@@ -71,8 +76,8 @@ fn text_length(rest: &str) -> usize {
 mod tests {
     use super::*;
 
-    /// Symptom: a refined model of 260 kB ended the process by an overflow of the stack. Cause: inline tables inside of
-    /// each other, which the parser follows by recursion.
+    /// Symptom: a refined model of 260 kB ended the process by a stack overflow. Cause: nested
+    /// inline tables, which the parser follows by recursion.
     #[test]
     fn brackets_that_are_nested_without_end_are_refused() {
         for unit in ["[", "{", "a = [", "a = {b = ", "[{a="] {
@@ -87,9 +92,9 @@ mod tests {
         let text = "a = [\"[[[\", '{{\\', '''[\n[''', \"\"\"\\\"[\"\"\"] # [[[[\nb = [[1], [2]]\n";
         assert_eq!(levels(text), 2);
         assert!(read::<toml::Table>(text).is_ok());
-        // A text without an end mark hides nothing of the lines behind it.
+        // A string without an end mark does not hide the following lines.
         assert_eq!(levels("a = \"]]]\nb = [[["), 3);
-        // Signs of several bytes behind a backslash.
+        // Multi-byte characters after a backslash.
         assert_eq!(levels("a = \"\\é[\""), 0);
     }
 }

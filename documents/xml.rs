@@ -1,19 +1,20 @@
-//! The document as XML: includes spliced in by text, and what would end a parser refused first.
+//! The document as XML: replaces includes by their text, and refuses input that would crash a
+//! parser.
 
 use crate::guard::one_line;
 
-/// Why a document cannot be taken.
+/// Reason why a document is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{document}: {message}")]
 pub struct Fault {
     /// Name or path of the document, or of the included one.
     pub document: String,
-    /// What is wrong, with its line where known.
+    /// The problem, with its line if known.
     pub message: String,
 }
 
 impl Fault {
-    /// What is wrong with a document.
+    /// Describes a problem of a document.
     pub fn new(document: impl Into<String>, message: impl Into<String>) -> Self {
         Self {
             document: document.into(),
@@ -22,21 +23,24 @@ impl Fault {
     }
 }
 
-/// Deepest chain of `<include>` that is followed.
+/// Maximum depth of a chain of `<include>`.
 const MAX_INCLUDE_DEPTH: usize = 8;
 
-/// Most includes of one document that are followed: a few files that include each other several times
-/// over would otherwise fill the memory. MuJoCo's largest models have some dozens.
+/// Maximum number of includes of one document.
+///
+/// A few files that include each other several times could otherwise fill the memory. MuJoCo's
+/// largest models have some dozens.
 const MAX_INCLUDES: usize = 1000;
 
-/// Levels of elements that a document may have: robots have some 30, and ropes of 200 bodies fit. Parsers and
-/// engines follow them by recursion, at some kB of the stack a level.
+/// Maximum nesting of elements: robots have about 30 levels, and ropes of 200 bodies fit.
+///
+/// Parsers and engines follow levels by recursion and use some kB of the stack per level.
 pub const MAX_LEVELS: usize = 256;
 
 /// Parses the document `name`.
 ///
 /// # Errors
-/// When it is not well-formed, with line and column, or its elements are nested without end.
+/// If it is not well-formed, with line and column, or if its elements are nested endlessly.
 pub fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>, Fault> {
     if levels(xml) > MAX_LEVELS {
         let message =
@@ -49,7 +53,8 @@ pub fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>, Fa
     })
 }
 
-/// The most elements of a document that are open at a time, found without recursion; of what is no XML any number.
+/// Maximum number of simultaneously open elements, found without recursion; any number if the text
+/// is no XML.
 fn levels(xml: &str) -> usize {
     let (mut open, mut most) = (0_usize, 0);
     let mut rest = xml;
@@ -77,7 +82,7 @@ fn levels(xml: &str) -> usize {
     most
 }
 
-/// Where the `>` of a tag is, outside of quotes; the end of the text where it has none.
+/// Position of the `>` of a tag, outside of quotes; the end of the text if there is none.
 fn end_of_tag(tag: &str) -> usize {
     let mut quote = None;
     for (i, b) in tag.bytes().enumerate() {
@@ -91,7 +96,7 @@ fn end_of_tag(tag: &str) -> usize {
     tag.len()
 }
 
-/// An order of Euler's axes that is none, which parsers take for three letters, and its node.
+/// The first `eulerseq` that is no order of three axes, and its node. Parsers assume three letters.
 #[must_use]
 pub fn wrong_eulerseq<'a>(
     document: &'a roxmltree::Document<'_>,
@@ -103,11 +108,12 @@ pub fn wrong_eulerseq<'a>(
     given.find(|(_, text)| !axes(text))
 }
 
-/// The document `xml`, with every `<include file="…"/>` replaced by the children of the root of the file that `load`
-/// reads.
+/// The document `xml` with every `<include file="…"/>` replaced.
+///
+/// The replacement is the children of the root of the file, which `load` reads.
 ///
 /// # Errors
-/// Where a file is not there or not well-formed, or includes have no end.
+/// If a file is missing or not well-formed, or if includes are endless.
 pub fn spliced(
     name: &str,
     xml: &str,
@@ -116,7 +122,7 @@ pub fn spliced(
     splice(name, xml, 0, &mut MAX_INCLUDES.clone(), load)
 }
 
-/// [`spliced`], some includes deep; `left` is how many more may be followed.
+/// [`spliced`] at some depth of includes; `left` is how many more may be followed.
 fn splice(
     name: &str,
     xml: &str,

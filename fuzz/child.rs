@@ -1,6 +1,7 @@
-//! One process that reads inputs: panics and memory are seen here, hangs by a second thread.
+//! The process that reads inputs. It detects panics and memory use itself; a second thread detects
+//! hangs.
 //!
-//! Its report is lines on standard output: `state` twice a second, `finding` where something is wrong, `end`.
+//! It reports by lines on standard output: `state` twice a second, `finding` for a problem, `end`.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -19,19 +20,22 @@ use crate::finding::Finding;
 use crate::readers::{self, Reader};
 use crate::{damage, memory, work_time};
 
-/// Most bytes that one input may hold at a time: what a log of an hour at 1 kHz with 20 columns takes as numbers is 0.6 GB, and inputs are at
-/// most 0.3 MB, so that a thousand times their size is more than any layout of them needs.
+/// Most bytes that one input may hold at a time.
+///
+/// A log of one hour at 1 kHz with 20 columns takes 0.6 GB as numbers. Inputs have at most 0.3 MB,
+/// so a thousand times their size is more than any layout of them needs.
 pub const MOST_MEMORY: usize = 256 << 20;
-/// CPU time after which an input counts as a hang, s: a thousand times what the median input takes.
+/// CPU time after which an input counts as a hang, s: a thousand times that of the median input.
 const HANG_CPU_S: f64 = 10.0;
-/// Time after which an input that takes no CPU time counts as a hang: it waits for something.
+/// Wall-clock time after which an input counts as a hang without CPU time, because it waits for
+/// something.
 const HANG_WAIT: Duration = Duration::from_secs(300);
-/// Stack of the thread that reads: what Rust gives to a thread, the least that a caller has.
+/// Stack of the reading thread: Rust's default for a thread, the smallest that a caller has.
 const STACK: usize = 2 << 20;
-/// Time between two lines of `state`.
+/// Time between two `state` lines.
 const REPORT: Duration = Duration::from_millis(500);
 
-/// File in the scratch folder that holds the number of the input that is being read.
+/// File in the scratch folder with the number of the current input.
 pub const AT: &str = "at";
 /// Exit status after a hang.
 pub const HUNG: i32 = 3;
@@ -54,22 +58,23 @@ pub struct Arguments {
     scratch: PathBuf,
 }
 
-/// The streams that a reader's inputs are drawn from.
+/// The random streams from which a reader's inputs are drawn.
 #[must_use]
 pub fn streams(seed: u64, reader: &str) -> Streams {
     Streams::new(seed).child(reader)
 }
 
-/// Number of the input that is being read.
+/// Number of the current input.
 static CURRENT: AtomicU64 = AtomicU64::new(u64::MAX);
-/// What the latest panic said and where, until it is asked for.
+/// Message and place of the latest panic, until it is taken.
 static PANIC: Mutex<Option<(String, String)>> = Mutex::new(None);
 
 fn latest_panic() -> Option<(String, String)> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
-/// Whether a place in the source is this repository's: its files are named from its root on, others absolutely.
+/// Whether a source path belongs to this repository, whose paths are relative to its root; others
+/// are absolute.
 fn is_own(place: &str) -> bool {
     !place.starts_with(['/', '\\']) && !place.starts_with("library/")
 }
@@ -77,7 +82,7 @@ fn is_own(place: &str) -> bool {
 /// Reads the inputs.
 ///
 /// # Errors
-/// When the corpus or the scratch folder cannot be used.
+/// If the corpus or the scratch folder cannot be used.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let reader = readers::named(&arguments.reader)?;
     std::panic::set_hook(Box::new(|info| {
@@ -98,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     })
 }
 
-/// Ends the process when one input takes too long.
+/// Ends the process if one input takes too long.
 fn watch() {
     let (mut seen, mut since) = (u64::MAX, (Instant::now(), 0.0));
     loop {
@@ -129,7 +134,7 @@ fn say(line: &str) {
     let _ = out.flush();
 }
 
-/// Figures of what was read.
+/// Figures of the inputs read so far.
 #[derive(Clone, Copy, Default)]
 struct State {
     inputs: u64,
@@ -161,7 +166,7 @@ fn read_all(reader: &'static Reader, arguments: &Arguments) -> Result<()> {
     if let Some(folder) = input.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    // What a reader makes once is no input's memory.
+    // Memory that a reader allocates only once must not count for an input.
     let _ = std::panic::catch_unwind(|| {
         std::fs::write(&input, &corpus.files[0]).map(|()| (reader.read)(&input))
     });
@@ -213,7 +218,7 @@ fn read_all(reader: &'static Reader, arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What is wrong with the reading of an input.
+/// Problems with the reading of an input.
 fn wrong(
     read: &std::thread::Result<Result<(), String>>,
     most: usize,
@@ -225,7 +230,8 @@ fn wrong(
             let (text, place) = panic.unwrap_or_default();
             found.push(("panic", format!("{text} at {place}")));
         }
-        // A library's own check that failed may be caught; one of ours is a fault all the same.
+        // A failed check of another library may be caught; a panic of our own code is a fault even
+        // then.
         (Ok(_), Some((text, place))) if is_own(&place) => {
             found.push(("caught", format!("{text} at {place}")));
         }

@@ -1,32 +1,32 @@
-//! Valid files that damaged ones are made from, and the words in them.
+//! Valid files from which damaged ones are made, and the words in them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-/// Largest file of a corpus, bytes: larger ones only make inputs slower.
+/// Largest file of a corpus, bytes; larger files only make inputs slower.
 const LARGEST_FILE: u64 = 1 << 16;
-/// Shortest and longest word, bytes.
+/// Range of the length of a word, bytes.
 const WORD: std::ops::RangeInclusive<usize> = 2..=40;
-/// Most words of a corpus.
+/// Maximum number of words of a corpus.
 const MOST_WORDS: usize = 2000;
 
 /// Valid files of one format.
 pub struct Corpus {
     /// The files.
     pub files: Vec<Vec<u8>>,
-    /// Words of the format: names, and texts between marks.
+    /// Words of the format: names, and texts between delimiters.
     pub words: Vec<Vec<u8>>,
-    /// Pieces that open a level, such as `<body name="a">`.
+    /// Pieces that open a nesting level, such as `<body name="a">`.
     pub openings: Vec<Vec<u8>>,
 }
 
 impl Corpus {
-    /// Files, and folders of files, by their way from the repository's root.
+    /// Reads files, and folders of files, by their paths from the repository's root.
     ///
     /// # Errors
-    /// When one cannot be read, is too large, or there is none.
+    /// If a file cannot be read or is too large, or if there is none.
     pub fn read(ways: &[&str]) -> Result<Self> {
         let mut files = Vec::new();
         for way in ways {
@@ -78,7 +78,7 @@ impl Corpus {
     }
 }
 
-/// The repository.
+/// The root of the repository.
 #[must_use]
 pub fn root() -> PathBuf {
     let own = Path::new(env!("CARGO_MANIFEST_DIR"));

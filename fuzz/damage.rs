@@ -1,22 +1,25 @@
-//! Damaged files: what a disk, a broken transfer, a typo or a malicious hand makes of a valid one.
+//! Damaged files: what a disk, a broken transfer, a typo or an attacker makes of a valid file.
 //!
-//! A valid file is changed in a few places by operations that are each blind to the format, with words and numbers that the format's own
-//! files hold. Most results are close enough to a valid file to get past its first checks.
+//! A few operations that know nothing of the format change a valid file. They insert words and
+//! numbers from the format's own files. Most results are close enough to a valid file to pass its
+//! first checks.
 
 use rand::Rng as _;
 
 use crate::corpus::Corpus;
 
-/// Longest input, bytes: four times the largest file of a corpus, so that repetition shows what grows with it.
+/// Longest input, bytes: four times the largest file of a corpus, so that repetition shows what
+/// grows with it.
 const LONGEST: usize = 1 << 18;
-/// Deepest repetition of a piece: beyond the nesting that fills a stack of 2 MiB at 100 bytes a level.
+/// Maximum number of repetitions of a piece: more than the nesting that fills a stack of 2 MiB at
+/// 100 bytes per level.
 const MOST_REPEATS: usize = 20_000;
-/// Share of inputs that begin as random bytes, which no reader should take for long.
+/// Share of inputs that begin as random bytes. Readers should reject these soon.
 const RANDOM: f64 = 0.01;
-/// Share of inputs that begin as the head of one file and the tail of another.
+/// Share of inputs that begin with the head of one file and the tail of another.
 const SPLICED: f64 = 0.1;
 
-/// Numbers at the ends of what types and readers can hold.
+/// Numbers at the limits of what types and readers can hold.
 const NUMBERS: [&str; 30] = [
     "0",
     "-0",
@@ -50,7 +53,7 @@ const NUMBERS: [&str; 30] = [
     "",
 ];
 
-/// Whole numbers of binary formats at such ends.
+/// Integers of binary formats at such limits.
 const BINARY: [u64; 12] = [
     0,
     1,
@@ -66,13 +69,13 @@ const BINARY: [u64; 12] = [
     0xffff_ffff_ffff_ffff,
 ];
 
-/// The generator of one input.
+/// The random number generator of one input.
 pub type Rng = asid_core::rng::Rng;
 
-/// One damaged file.
+/// Makes one damaged file.
 pub fn input(corpus: &Corpus, rng: &mut Rng) -> Vec<u8> {
     let mut bytes = start(corpus, rng);
-    // Mostly one or two changes, which leave the most of the format; some inputs get many.
+    // Mostly one or two changes, which keep most of the format; some inputs get many.
     let mut changes = 1;
     while changes < 32 && rng.random_bool(0.5) {
         changes += 1;
@@ -101,7 +104,7 @@ fn start(corpus: &Corpus, rng: &mut Rng) -> Vec<u8> {
     bytes
 }
 
-/// A place and a length of a piece; short pieces are as likely as long ones.
+/// Start and length of a piece; short pieces are as likely as long ones.
 fn piece(bytes: &[u8], rng: &mut Rng) -> std::ops::Range<usize> {
     let from = rng.random_range(0..=bytes.len());
     let longest = 1_usize << rng.random_range(0..12);
@@ -155,7 +158,7 @@ fn change(bytes: &mut Vec<u8>, corpus: &Corpus, rng: &mut Rng) {
     }
 }
 
-/// Repeats a piece, or a word with what opens and closes it, many times in place.
+/// Repeats a piece, or a word with its opening and closing, many times in place.
 fn repeat(bytes: &mut Vec<u8>, corpus: &Corpus, rng: &mut Rng) {
     let times = 1 << rng.random_range(1..=MOST_REPEATS.ilog2());
     let at = rng.random_range(0..=bytes.len());
@@ -172,7 +175,7 @@ fn repeat(bytes: &mut Vec<u8>, corpus: &Corpus, rng: &mut Rng) {
     }
 }
 
-/// Puts a number of [`NUMBERS`] in the place of one that is there.
+/// Replaces a number in the text by one of [`NUMBERS`].
 fn number(bytes: &mut Vec<u8>, rng: &mut Rng) {
     let from = rng.random_range(0..=bytes.len());
     let Some(first) = bytes[from..].iter().position(u8::is_ascii_digit) else {
@@ -185,7 +188,7 @@ fn number(bytes: &mut Vec<u8>, rng: &mut Rng) {
     bytes.splice(first..first + length, new.bytes());
 }
 
-/// Overwrites 1, 2, 4 or 8 bytes by a number of [`BINARY`], in either order of bytes.
+/// Overwrites 1, 2, 4 or 8 bytes by a number of [`BINARY`], in either byte order.
 fn binary(bytes: &mut [u8], rng: &mut Rng) {
     let size = 1 << rng.random_range(0..4);
     if bytes.len() < size {

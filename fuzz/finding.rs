@@ -1,4 +1,4 @@
-//! What is wrong with a reader, and the file that repeats it.
+//! A problem of a reader, and the file that reproduces it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,12 +12,12 @@ pub struct Finding {
     pub kind: String,
     /// Number of the input.
     pub index: u64,
-    /// What is known of it, in one line.
+    /// Description in one line.
     pub message: String,
 }
 
 impl Finding {
-    /// What findings of one fault share: their kind, and their message without its numbers.
+    /// Key that findings of one fault share: their kind, and their message without its numbers.
     #[must_use]
     pub fn fault(&self) -> String {
         let place = self.message.rsplit_once(" at ").map_or("", |(_, p)| p);
@@ -30,13 +30,13 @@ impl Finding {
         format!("{}: {told}", self.kind)
     }
 
-    /// A line of the child's report.
+    /// The finding as a line of the child's report.
     #[must_use]
     pub fn line(&self) -> String {
         format!("finding {} {} {}", self.kind, self.index, self.message)
     }
 
-    /// Reads such a line.
+    /// Parses such a line.
     #[must_use]
     pub fn of_line(line: &str) -> Option<Self> {
         let mut parts = line.strip_prefix("finding ")?.splitn(3, ' ');
@@ -47,10 +47,10 @@ impl Finding {
         })
     }
 
-    /// Writes the input, and beside it what is wrong and how to repeat it.
+    /// Writes the input, and beside it the problem and how to reproduce it.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// If a file cannot be written.
     pub fn keep(&self, folder: &Path, reader: &str, seed: u64, input: &[u8]) -> Result<PathBuf> {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         let file = folder.join(format!("{reader}-{seed}-{}", self.index));

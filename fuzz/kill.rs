@@ -1,8 +1,8 @@
-//! Commands that are killed while they work: no half of a result may stand under its final name, and the same command must
-//! succeed afterwards.
+//! Kills commands while they work. No partial result may have its final name, and the same command
+//! must succeed afterwards.
 //!
-//! Half of the kills fall anywhere between start and end, half into the time in which files are written, which is short: from the moment on
-//! that a staging folder is seen.
+//! Half of the kills come at any time between start and end. The other half come in the short time
+//! in which files are written: after a staging folder has appeared.
 
 mod commands;
 mod left;
@@ -17,7 +17,8 @@ use rand::Rng as _;
 
 use commands::{COMMANDS, Case};
 
-/// Longest time between the sight of a staging folder and the kill: writing takes some milliseconds.
+/// Maximum time between the appearance of a staging folder and the kill: writing takes some
+/// milliseconds.
 const WRITING: Duration = Duration::from_millis(20);
 
 /// Arguments of `kill`.
@@ -40,17 +41,17 @@ pub struct Arguments {
 #[derive(Default)]
 struct Count {
     kills: u64,
-    /// Kills that came while files were written.
+    /// Kills while files were being written.
     writing: u64,
-    /// The command had ended before.
+    /// Kills that came after the command had ended.
     late: u64,
     faults: Vec<String>,
 }
 
-/// Kills commands; true where nothing was found.
+/// Kills commands; true if nothing was found.
 ///
 /// # Errors
-/// When a command is not known or cannot be started, or fails undisturbed.
+/// If a command is not known, cannot be started, or fails without a kill.
 pub fn kill(arguments: &Arguments) -> Result<bool> {
     let asid = match &arguments.asid {
         Some(asid) => std::path::absolute(asid)?,
@@ -106,7 +107,7 @@ fn try_case(case: &Case, asid: &Path, arguments: &Arguments) -> Result<Count> {
         let place = folder.path().join(format!("{k}"));
         std::fs::create_dir(&place)?;
         (case.prepare)(&place, asid)?;
-        // A folder that is there already is filled in another way than one that is not.
+        // A folder that already exists is filled in another way than a new one.
         if case.folder && k % 4 >= 2 {
             std::fs::create_dir_all(place.join(case.out))?;
         }
@@ -120,7 +121,7 @@ fn try_case(case: &Case, asid: &Path, arguments: &Arguments) -> Result<Count> {
             count.writing += u64::from(seen);
             seen && wait(&mut child, WRITING.mul_f64(rng.random()))?
         };
-        // SIGKILL: the process cannot tidy up.
+        // SIGKILL, so that the process cannot clean up.
         let _ = child.kill();
         child.wait()?;
         count.kills += u64::from(killed);
@@ -135,11 +136,11 @@ fn try_case(case: &Case, asid: &Path, arguments: &Arguments) -> Result<Count> {
     Ok(count)
 }
 
-/// What is wrong with what is left, and with a second call.
+/// Checks what is left, and a second call.
 fn look(case: &Case, asid: &Path, place: &Path, wanted: &[String]) -> Result<()> {
     let out = place.join(case.out);
     left::check_files(&out)?;
-    // Where the result is whole, there is nothing more to do.
+    // If the result is complete, there is nothing more to do.
     if left::files(&out)? == wanted && !case.repeats {
         return Ok(());
     }
@@ -168,7 +169,7 @@ fn command(case: &Case, asid: &Path, place: &Path) -> Command {
     command
 }
 
-/// Calls it to its end.
+/// Calls the command and waits for its end.
 fn run(case: &Case, asid: &Path, place: &Path) -> Result<()> {
     let output = command(case, asid, place)
         .stderr(Stdio::piped())
@@ -184,13 +185,13 @@ fn run(case: &Case, asid: &Path, place: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Waits for a while; false where the process ended before.
+/// Waits for a while; false if the process ends before.
 fn wait(child: &mut Child, time: Duration) -> Result<bool> {
     std::thread::sleep(time);
     Ok(child.try_wait()?.is_none())
 }
 
-/// Waits until files are being written; false where the process ended before that was seen.
+/// Waits until files are being written; false if the process ends before that.
 fn wait_for_staging(child: &mut Child, place: &Path) -> Result<bool> {
     loop {
         if !left::hidden(place)?.is_empty() {

@@ -1,10 +1,10 @@
 //! Damaged files for every reader, and commands that are killed while they write.
 //!
-//! `cargo xtask fuzz` builds and calls it. Readers run in a child process, so that an overflow of the
-//! stack or an exhausted memory is a finding and not the end. Input `i` of a seed is always the same bytes:
-//! a finding is repeated by its number alone.
+//! `cargo xtask fuzz` builds and calls it. Readers run in a child process, so that a stack overflow
+//! or exhausted memory becomes a finding and does not end the run. Input `i` of a seed always has
+//! the same bytes, so its number alone reproduces a finding.
 
-// A measuring tool talks to the terminal.
+// A measuring tool prints to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod child;
@@ -23,7 +23,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
-/// Every allocation of this program is counted.
+/// Counts every allocation of this program.
 #[global_allocator]
 static COUNTED: memory::Counted = memory::Counted;
 
@@ -70,7 +70,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Reads one file as a reader does, and says what came of it.
+/// Reads one file as a reader does, and prints the result.
 fn repeat(reader: &str, file: &std::path::Path) -> Result<bool> {
     let reader = readers::named(reader)?;
     let scratch = tempfile::tempdir()?;

@@ -1,6 +1,7 @@
-//! An allocator that counts: how many bytes are held, and the most since the last question.
+//! A counting allocator: the bytes held, and their peak since the last reset.
 //!
-//! Memory that C libraries take (SQLite, zstd) is not seen here; the limit of the child's address space bounds it.
+//! It does not see memory of C libraries (SQLite, zstd). The limit of the child's address space
+//! bounds that.
 
 #![allow(unsafe_code)]
 
@@ -10,9 +11,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// The system's allocator, counted.
 pub struct Counted;
 
-/// Bytes that are held.
+/// Bytes that are held now.
 static HELD: AtomicUsize = AtomicUsize::new(0);
-/// Most bytes that were held at a time since [`reset`].
+/// Peak of the bytes held since [`reset`].
 static MOST: AtomicUsize = AtomicUsize::new(0);
 
 fn taken(bytes: usize) {
@@ -20,7 +21,8 @@ fn taken(bytes: usize) {
     MOST.fetch_max(held, Ordering::Relaxed);
 }
 
-// SAFETY: every call is handed to the system's allocator as it is, and the counters never allocate.
+// SAFETY: every call is passed on to the system's allocator unchanged, and the counters never
+// allocate.
 unsafe impl GlobalAlloc for Counted {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller keeps the contract of `alloc`.
@@ -57,14 +59,14 @@ unsafe impl GlobalAlloc for Counted {
     }
 }
 
-/// Begins a new measurement; what is held now counts as nothing.
+/// Begins a new measurement; returns the bytes held now, which do not count in it.
 pub fn reset() -> usize {
     let held = HELD.load(Ordering::Relaxed);
     MOST.store(held, Ordering::Relaxed);
     held
 }
 
-/// Most bytes held at a time since [`reset`] returned `before`, beyond these.
+/// Peak of the bytes held since [`reset`] returned `before`, minus `before`.
 pub fn most_since(before: usize) -> usize {
     MOST.load(Ordering::Relaxed).saturating_sub(before)
 }

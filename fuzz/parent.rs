@@ -1,4 +1,4 @@
-//! Starts a child for each reader, goes on after one that died, and sums up.
+//! Starts a child for each reader, continues after a child that died, and sums up.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
@@ -14,9 +14,10 @@ use crate::damage;
 use crate::finding::Finding;
 use crate::readers::{READERS, Reader, named};
 
-/// Address space of a child, KiB: what C libraries take counts here too. The program and its stacks take 0.3 GiB of it.
+/// Address space of a child, KiB. It includes memory of C libraries; the program and its stacks
+/// take 0.3 GiB.
 const ADDRESS_SPACE_KIB: u64 = 2 << 20;
-/// Inputs of one fault that are kept: more tell nothing new.
+/// Number of inputs per fault that are kept; more give no new information.
 const KEPT_OF_FAULT: u64 = 3;
 /// Time between two lines of progress.
 const PROGRESS: Duration = Duration::from_secs(10);
@@ -46,7 +47,7 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
-/// What came of one reader.
+/// Result of one reader.
 #[derive(Default)]
 struct Summary {
     inputs: u64,
@@ -55,14 +56,14 @@ struct Summary {
     slowest_us: u64,
     slowest_index: u64,
     cpu_us: u64,
-    /// Findings by fault, with the first input of each.
+    /// Findings by fault: how many, and the first one.
     faults: BTreeMap<String, (u64, Finding)>,
 }
 
-/// Reads damaged files; true where nothing was found.
+/// Reads damaged files; true if nothing was found.
 ///
 /// # Errors
-/// When a child cannot be started or a file not be written.
+/// If a child cannot be started or a file cannot be written.
 pub fn read(arguments: &Arguments) -> Result<bool> {
     if arguments.list {
         for reader in READERS {
@@ -112,7 +113,7 @@ fn row(name: &str, s: &Summary) -> String {
     )
 }
 
-/// A reader that is being tried.
+/// A reader under test.
 struct Watch<'a> {
     reader: &'static Reader,
     arguments: &'a Arguments,
@@ -120,14 +121,15 @@ struct Watch<'a> {
     out: PathBuf,
     start: Instant,
     told: Instant,
-    /// Figures of children that have ended, and of the one that runs.
+    /// Figures of the children that have ended and of the running one.
     summary: Summary,
     running: [u64; 3],
 }
 
 impl<'a> Watch<'a> {
     fn new(reader: &'static Reader, arguments: &'a Arguments) -> Result<Self> {
-        // Inputs are written a thousand times a second: into memory, where there is such a folder.
+        // Inputs are written a thousand times a second, so they go to memory if there is such a
+        // folder.
         let memory = Path::new("/dev/shm");
         let scratch = if memory.is_dir() {
             tempfile::tempdir_in(memory)
@@ -162,7 +164,7 @@ impl<'a> Watch<'a> {
             if ended {
                 break;
             }
-            // It died while it read one input; the next child goes on behind that.
+            // The child died while it read one input; the next child continues after that input.
             let index = self.at().unwrap_or(from);
             if !found {
                 let message = format!("the process ended by {status}");
@@ -172,7 +174,7 @@ impl<'a> Watch<'a> {
                     message,
                 })?;
             }
-            // What it had read since its last line is not in that line.
+            // The child's last line does not include what it has read since.
             self.summary.inputs = index + 1 - self.arguments.from;
             from = index + 1;
         }
@@ -183,13 +185,16 @@ impl<'a> Watch<'a> {
         60.0 * self.arguments.minutes - self.start.elapsed().as_secs_f64()
     }
 
-    /// Number of the input that the last child was at.
+    /// Number of the input that the last child was reading.
     fn at(&self) -> Option<u64> {
         let bytes = std::fs::read(self.scratch.path().join(AT)).ok()?;
         Some(u64::from_le_bytes(bytes.try_into().ok()?))
     }
 
-    /// Runs one child to its end: whether it came to it, its status, and whether it said itself what killed it.
+    /// Runs one child until it ends.
+    ///
+    /// Returns whether it came to its end, its status, and whether it reported itself what killed
+    /// it.
     fn child(&mut self, from: u64, to: u64) -> Result<(bool, ExitStatus, bool)> {
         let own = std::env::current_exe().context("cannot tell where this program lies")?;
         let mut child = Command::new("sh")

@@ -1,4 +1,4 @@
-//! The readers: one row each, with the files its inputs are made from.
+//! The readers: one row each, with the files from which its inputs are made.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -13,11 +13,11 @@ use asid_mjcf::Plant;
 
 use crate::corpus::{Corpus, root};
 
-/// A machine of two joints, whose logs are in four formats beside it.
+/// A machine with two joints; logs of it in four formats are beside it.
 const MACHINE: &str = "logs/tests/fixtures/nominal.xml";
-/// A log of it.
+/// A log of that machine.
 const LOG: &str = "logs/tests/fixtures/csv/train_0.csv";
-/// Episodes of a log that are laid out as tables: each takes the same code.
+/// Episodes of a log in table formats; each takes the same code path.
 const EPISODES: usize = 3;
 
 /// A reader of files.
@@ -26,13 +26,13 @@ pub struct Reader {
     pub name: &'static str,
     /// What it reads, for the page.
     pub what: &'static str,
-    /// Name of the input's file, which tells its kind.
+    /// Name of the input's file, which determines its kind.
     pub file: &'static str,
     /// Its corpus.
     pub corpus: fn() -> Result<Corpus>,
-    /// Writes what an input needs beside it into a folder.
+    /// Writes the files that an input needs beside it into a folder.
     pub prepare: fn(&Path) -> Result<()>,
-    /// Reads an input; the error is what a user is told.
+    /// Reads an input; the error is the message for the user.
     pub read: fn(&Path) -> Result<(), String>,
 }
 
@@ -191,7 +191,7 @@ pub const READERS: &[Reader] = &[
 /// The reader of this name.
 ///
 /// # Errors
-/// When there is none.
+/// If there is none.
 pub fn named(name: &str) -> Result<&'static Reader> {
     let Some(reader) = READERS.iter().find(|r| r.name == name) else {
         let known: Vec<&str> = READERS.iter().map(|r| r.name).collect();
@@ -204,7 +204,7 @@ fn nothing(_: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The machine and a log of it, as `model.xml`, `log.csv` and `held.csv`.
+/// Copies the machine and a log of it to `model.xml`, `log.csv` and `held.csv`.
 fn beside_model(folder: &Path) -> Result<()> {
     std::fs::copy(root().join(MACHINE), folder.join("model.xml"))?;
     let log = std::fs::read_to_string(root().join(LOG))?;
@@ -231,14 +231,14 @@ fn machine() -> &'static (Scene, Plant) {
     })
 }
 
-/// A table as a log of ASID, and as one of another stack.
+/// Reads a table as a log of ASID, and as one of another stack.
 fn table(path: &Path) -> Result<(), String> {
     let own = asid_logs::episode::read(path, &machine().1.layout);
     let other = import(path);
     told(own.map(drop)).and(other)
 }
 
-/// A log of another stack, with the mapping that is proposed for it.
+/// Reads a log of another stack with the mapping that is proposed for it.
 fn import(path: &Path) -> Result<(), String> {
     let (scene, plant) = machine();
     let told = |e: asid_core::Error| e.to_string();
@@ -255,7 +255,7 @@ fn import(path: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// A log as Parquet, plain and compressed in two ways, beside a dataset's table with lists.
+/// A log as Parquet, plain and with two compressions, and a dataset's table with lists.
 fn tables() -> Result<Corpus> {
     use parquet::basic::{Compression, ZstdLevel};
     use parquet::data_type::DoubleType;
@@ -303,10 +303,11 @@ fn tables() -> Result<Corpus> {
     Ok(Corpus::of_files(files))
 }
 
-/// What parts a message from its definition, and the definition from its type and encodings.
+/// Separator between a message and its definition, and between the definition and its type and
+/// encodings.
 const PART: &[u8] = b"\n\0\n";
 
-/// Messages of the fixtures with type, encoding and definition before each.
+/// Messages of the fixtures; type, encoding and definition come before each.
 fn messages() -> Result<Corpus> {
     let path = root().join("logs/tests/fixtures/mcap/train_0.mcap");
     let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
@@ -333,7 +334,7 @@ fn messages() -> Result<Corpus> {
     Ok(Corpus::of_files(files))
 }
 
-/// Decodes a message twice, a second apart.
+/// Decodes a message twice, one second apart.
 fn message(path: &Path) -> Result<(), String> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
     let split =

@@ -1,4 +1,4 @@
-//! The commands that write, with settings that make them quick, and what they need.
+//! The commands that write, with settings that make them quick, and their input files.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -11,17 +11,17 @@ use crate::corpus::root;
 pub struct Case {
     /// Name in the table.
     pub name: &'static str,
-    /// Its arguments, in a folder of its own.
+    /// Its arguments, for a call in a folder of its own.
     pub arguments: &'static [&'static str],
-    /// Settings that it takes by `--set`, besides.
+    /// Further settings that it takes by `--set`.
     pub settings: &'static [&'static [&'static str]],
-    /// What it writes.
+    /// Path of its output.
     pub out: &'static str,
-    /// Whether that is a folder that may be there already, empty.
+    /// Whether the output is a folder that may already exist, empty.
     pub folder: bool,
-    /// Whether it may be called again where its result is whole.
+    /// Whether it may be called again if its result is complete.
     pub repeats: bool,
-    /// Writes into the folder what the command reads; the program is at the second path.
+    /// Writes the command's input files into the folder; the second path is that of the program.
     pub prepare: fn(&Path, &Path) -> Result<()>,
 }
 
@@ -54,7 +54,8 @@ impl Case {
     }
 }
 
-/// Commands that write files. `conformance` and the figures of `compare` write by the same code as `run` and `compare`.
+/// Commands that write files. `conformance` and the figures of `compare` use the same code to write
+/// as `run` and `compare`.
 pub const COMMANDS: &[Case] = &[
     Case {
         name: "run",
@@ -232,7 +233,7 @@ fn nothing(_: &Path, _: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The study of a machine of two joints, with one parameter.
+/// The study of a machine with two joints and one parameter.
 fn study(folder: &Path, _: &Path) -> Result<()> {
     let (from, to) = (root().join("logs/tests/fixtures"), folder.join("study"));
     std::fs::create_dir_all(&to)?;
@@ -260,7 +261,7 @@ fn cases(folder: &Path, asid: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A finished diagnosis of that study, made once.
+/// A finished diagnosis of that study, made only once.
 fn diagnosis(folder: &Path, asid: &Path) -> Result<()> {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     if MADE.get().is_none() {

@@ -1,11 +1,13 @@
-//! What a killed command leaves.
+//! The files that a killed command leaves.
 
 use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-/// Files below a path by their way from it, sorted, without hidden ones; of a file its own name, of nothing none.
+/// Relative paths of the files below a path, sorted, without hidden ones.
+///
+/// For a file the list holds one empty path; for a missing path it is empty.
 pub fn files(path: &Path) -> Result<Vec<String>> {
     let mut found = Vec::new();
     collect(path, "", &mut found)?;
@@ -31,7 +33,7 @@ fn collect(path: &Path, way: &str, found: &mut Vec<String>) -> Result<()> {
     Ok(())
 }
 
-/// Hidden entries below a folder, but for what lies in hidden ones.
+/// Hidden entries below a folder; entries inside hidden folders are not listed.
 pub fn hidden(folder: &Path) -> Result<Vec<String>> {
     let Ok(entries) = fs::read_dir(folder) else {
         return Ok(Vec::new());
@@ -49,7 +51,7 @@ pub fn hidden(folder: &Path) -> Result<Vec<String>> {
     Ok(found)
 }
 
-/// Looks at every file below a path: each must be whole.
+/// Checks that every file below a path is complete.
 pub fn check_files(path: &Path) -> Result<()> {
     for way in files(path)? {
         let file = if way.is_empty() {
@@ -64,7 +66,7 @@ pub fn check_files(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether a file has the end that its format has.
+/// Whether a file ends as its format requires.
 fn whole(file: &Path, bytes: &[u8]) -> Result<()> {
     let ending = file.extension().unwrap_or_default().to_string_lossy();
     let text = || std::str::from_utf8(bytes);

@@ -1,5 +1,5 @@
-//! `unknown:eddy-brake`: an eddy-current brake that is strongest at one speed, `-c v / (1 + (v /
-//! s)²)` (Smythe 1942).
+//! `unknown:eddy-brake`: an eddy-current brake that is strongest at one speed,
+//! `-c v / (1 + (v / s)²)` (Smythe 1942).
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

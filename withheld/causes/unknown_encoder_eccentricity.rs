@@ -1,5 +1,5 @@
-//! `unknown:encoder-eccentricity`: the disc of an encoder does not rotate about its centre, `r + a
-//! sin(n r + p)`.
+//! `unknown:encoder-eccentricity`: the disc of an encoder does not rotate about its centre,
+//! `r + a sin(n r + p)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values};

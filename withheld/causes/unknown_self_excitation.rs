@@ -1,5 +1,5 @@
-//! `unknown:self-excitation`: a force drives a joint on at low speed but not at high speed, `c v
-//! exp(-(v / s)²)`.
+//! `unknown:self-excitation`: a force drives a joint on at low speed but not at high speed,
+//! `c v exp(-(v / s)²)`.
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Place, Values, scalar_joints};

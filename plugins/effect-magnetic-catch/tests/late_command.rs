@@ -1,4 +1,6 @@
-//! An effect on commands, with memory: a drive that gets its command some physics steps late. Held against a drive that is told later.
+//! An effect on commands with memory: a drive gets its command some physics steps late.
+//!
+//! The test compares it with a drive that is commanded later.
 
 #![allow(clippy::unwrap_used)]
 
@@ -16,7 +18,7 @@ asid_effects::register!(EffectEntry {
     make: || Box::new(LateCommand),
 });
 
-/// Most physics steps that are looked for.
+/// Largest number of physics steps in the search.
 const MOST: f64 = 50.0;
 
 /// The effect.
@@ -29,7 +31,7 @@ impl Effect for LateCommand {
 
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
-            // Whole steps have no slope: a search begins at some values.
+            // Whole steps have no slope, so a search begins at several values.
             &[EffectParameter::new("steps", "1", [0.0, MOST], 0.0)
                 .starting(Start::Values(&[2.0, 5.0, 10.0]))]
         }
@@ -47,13 +49,13 @@ impl Effect for LateCommand {
         Ok(Box::new(Late {
             actuator: site.plant.layout.actuator(site.name)?,
             steps: steps.clamp(0.0, MOST).round() as usize,
-            // As much as any value needs: in a step nothing is allocated.
+            // Sized for any value, so that a step allocates nothing.
             past: VecDeque::with_capacity(MOST as usize + 1),
         }))
     }
 }
 
-/// The commands of one drive on their way.
+/// Delayed commands of one drive.
 struct Late {
     actuator: usize,
     steps: usize,
@@ -66,7 +68,7 @@ impl Acting for Late {
         let command = &mut view.ctrl[self.actuator];
         self.past.truncate(MOST as usize);
         self.past.push_front(*command);
-        // Before the first step the command was the same as in it.
+        // Before the first step the command was that of the first step.
         *command = self.past[self.steps.min(self.past.len() - 1)];
     }
 
@@ -84,14 +86,14 @@ impl Acting for Late {
     }
 }
 
-/// A rotor that a motor turns.
+/// A rotor driven by a motor.
 const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
   <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
     <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
   <actuator><motor name="drive" joint="spin"/></actuator>
   <sensor><jointpos name="angle" joint="spin"/></sensor></mujoco>"#;
 
-/// Angles after each step under commands, in two rollouts one after the other.
+/// Angles after each step under commands, in two consecutive rollouts.
 fn angles(effect: Option<&str>, commands: &[f64]) -> Vec<f64> {
     let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
     let specs: Vec<EffectSpec> = effect.iter().map(|e| e.parse().unwrap()).collect();

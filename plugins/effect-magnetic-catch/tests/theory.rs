@@ -1,4 +1,4 @@
-//! The catch against theory: energy is kept, and the speed over the magnet follows from it.
+//! The catch against theory: energy is conserved and gives the speed over the magnet.
 
 #![allow(clippy::unwrap_used)]
 
@@ -6,10 +6,10 @@ use asid_core::{BatchConfig, Control, Model as _, Rollout, Scene};
 use asid_effects::EffectSpec;
 use asid_effects::refined::Refined;
 
-// The crate registers the effect by being linked in.
+// Linking the crate registers the effect.
 use magnetic_catch as _;
 
-/// A rotor of 0.5 kg m² that nothing else acts on.
+/// A rotor of 0.5 kg m² on which nothing else acts.
 const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
   <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
     <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
@@ -18,7 +18,7 @@ const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002
 const INERTIA: f64 = 0.5;
 const FRAMES: usize = 1000;
 
-/// Angle and speed after each step of 2 ms, from an angle and a speed.
+/// Angle and speed after each step of 2 ms, from an initial angle and speed.
 fn motion(effect: Option<&str>, angle: f64, speed: f64) -> Vec<[f64; 2]> {
     let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
     let specs: Vec<EffectSpec> = effect.iter().map(|e| e.parse().unwrap()).collect();
@@ -47,7 +47,8 @@ fn the_speed_over_the_magnet_follows_from_its_energy() {
     };
     let path = motion(Some(&effect), -0.5, speed);
     let total = 0.5 * INERTIA * speed * speed;
-    // A semi-implicit step errs by half a step's work: F v dt / 2, at most 0.007 J here.
+    // The error of a semi-implicit step is the work of half a step: F v dt / 2, at most 0.007 J
+    // here.
     for &row in &path {
         let error = energy(row) - total;
         assert!(error.abs() < 0.007, "{row:?}: energy is off by {error} J");
@@ -67,7 +68,7 @@ fn the_speed_over_the_magnet_follows_from_its_energy() {
 
 #[test]
 fn a_slow_rotor_is_caught() {
-    // Energy below zero: it cannot leave the well.
+    // The energy is below zero, so the rotor cannot leave the well.
     let path = motion(Some("magnetic-catch@spin:depth=0.4"), 0.15, 0.2);
     assert!(path.iter().all(|row| row[0].abs() < 0.3));
 }

@@ -1,22 +1,22 @@
 //! The motion of one rigid body.
 //!
-//! Newton's and Euler's equations at the centre of mass, one semi-implicit Euler
-//! step at a time: velocities first, then the pose with the new velocities. The
-//! state is that of a free joint: origin and orientation of the body's frame,
-//! velocity of the origin in the world, angular velocity in the body.
+//! It integrates the Newton-Euler equations at the centre of mass by semi-implicit Euler steps:
+//! first the velocities, then the pose with the new velocities. The state is that of a free joint:
+//! origin and orientation of the body's frame, velocity of the origin in the world, angular
+//! velocity in the body.
 
 use asid_core::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// What does not change while a body flies.
+/// Constant properties of a body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Mass, kg.
     pub mass: f64,
     /// Centre of mass in the body's frame, m.
     pub center: Vector3<f64>,
-    /// Inertia about the centre along the body's axes, kg m².
+    /// Inertia about the centre of mass along the body's axes, kg m².
     pub inertia: Matrix3<f64>,
-    /// Its inverse.
+    /// Inverse of the inertia.
     pub inverse: Matrix3<f64>,
 }
 
@@ -34,7 +34,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Reads a free joint's seven positions and six velocities.
+    /// Reads the seven positions and six velocities of a free joint.
     #[must_use]
     pub fn read(qpos: &[f64], qvel: &[f64]) -> Self {
         Self {
@@ -47,7 +47,7 @@ impl Motion {
         }
     }
 
-    /// Writes them.
+    /// Writes the seven positions and six velocities of a free joint.
     pub fn write(&self, qpos: &mut [f64], qvel: &mut [f64]) {
         qpos[..3].copy_from_slice(self.position.as_slice());
         let q = self.rotation;
@@ -56,7 +56,7 @@ impl Motion {
         qvel[3..6].copy_from_slice(self.spin.as_slice());
     }
 
-    /// Velocity in the world of a point that is fixed in the body, m/s.
+    /// Velocity in the world of a body-fixed point, m/s.
     #[must_use]
     pub fn velocity_of(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.velocity + self.rotation * self.spin.cross(point)
@@ -70,12 +70,13 @@ pub struct Load {
     pub force: Vector3<f64>,
     /// Torque in the world, N m.
     pub torque: Vector3<f64>,
-    /// Generalised force of the free joint: three at the origin in the world, then
-    /// three about the origin in the body.
+    /// Generalised force of the free joint.
+    ///
+    /// Three components act at the origin in the world, then three about the origin in the body.
     pub joint: [f64; 6],
 }
 
-/// One step of `dt` seconds under `gravity` (m/s²).
+/// Takes one step of `dt` seconds under `gravity` (m/s²).
 pub fn step(body: &Body, motion: &mut Motion, load: &Load, gravity: &Vector3<f64>, dt: f64) {
     let [fx, fy, fz, tx, ty, tz] = load.joint;
     let at_origin = Vector3::new(fx, fy, fz);

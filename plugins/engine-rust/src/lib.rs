@@ -1,10 +1,10 @@
 //! An engine plugin in Rust: rigid bodies in free flight.
 //!
-//! The smallest engine that is still worth simulating with: bodies on free joints
-//! under gravity, pushes and hooks, without contact. It is here to be copied: a
-//! [`Backend`] that loads scenes ([`model`]) and refuses what it lacks ([`refusal`]),
-//! a simulator (`simulator.rs`) of whole-batch calls on as many threads as there are, the physics
-//! of one body ([`flight`]), and one line that makes it a library for `asid --plugin`.
+//! It is the smallest engine that is still useful: bodies on free joints under gravity, pushes and
+//! hooks, without contact. It is an example to copy. A [`Backend`] loads scenes ([`model`]) and
+//! refuses what it lacks ([`refusal`]). A simulator (`simulator.rs`) makes whole-batch calls on as
+//! many threads as there are, with the physics of one body in [`flight`]. One line makes the crate
+//! a library for `asid --plugin`.
 
 pub mod flight;
 pub mod model;

@@ -13,26 +13,26 @@ use crate::flight::Body;
 use crate::refusal;
 use crate::simulator::FlightSimulator;
 
-/// What all batches of a scene share.
+/// Data that all batches of a scene share.
 pub struct Compiled {
-    /// Names and places.
+    /// Names and indices.
     pub layout: Layout,
     /// Bodies on free joints, in the order of their joints.
     pub bodies: Vec<Body>,
-    /// Index of each in [`Layout::bodies`].
+    /// Index of each of these bodies in [`Layout::bodies`].
     pub places: Vec<usize>,
-    /// Frame that each sensor looks at; none where this engine cannot read it.
+    /// Frame that each sensor reads; `None` if this engine cannot read it.
     pub frames: Vec<Option<Frame>>,
     /// Gravity, m/s².
     pub gravity: Vector3<f64>,
-    /// Positions of a reset.
+    /// Positions after a reset.
     pub start: Vec<f64>,
 }
 
 /// A frame on a flying body.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
-    /// Which of [`Compiled::bodies`].
+    /// Index into [`Compiled::bodies`].
     pub body: usize,
     /// Its origin in the body's frame, m.
     pub position: Vector3<f64>,
@@ -40,12 +40,12 @@ pub struct Frame {
     pub rotation: UnitQuaternion<f64>,
 }
 
-/// What a parameter changes.
+/// The quantity that a parameter changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Column {
     /// A component of gravity.
     Gravity(usize),
-    /// Mass of one of [`Compiled::bodies`]; its inertia goes with it.
+    /// Mass of one of [`Compiled::bodies`]; its inertia scales with it.
     Mass(usize),
 }
 
@@ -58,8 +58,8 @@ impl FlightModel {
     /// Loads a scene.
     ///
     /// # Errors
-    /// [`Error::Scene`] for everything that this engine would have to ignore:
-    /// other joints than free ones, shapes that could meet, and whatever else `refusal` names.
+    /// [`Error::Scene`] for everything that this engine would have to ignore: joints that are not
+    /// free, shapes that could collide, and everything that `refusal` names.
     pub fn load(scene: &Scene) -> Result<Self> {
         let refuse = |message: String| Error::Scene {
             scene: scene.name().to_owned(),
@@ -130,7 +130,7 @@ impl FlightModel {
     }
 }
 
-/// Mass properties: as the document states them, or of the geoms.
+/// Mass properties, as stated in the document or computed from the geoms.
 fn mass_of(body: &mjcf_rs::body::Body) -> MassProperties {
     let Some(inertial) = &body.inertial else {
         let geoms: Vec<GeomMass> = body.geoms.iter().filter_map(GeomMass::of).collect();
@@ -159,8 +159,7 @@ fn pose(pose: &mjcf_rs::Pose) -> (Vector3<f64>, UnitQuaternion<f64>) {
     )
 }
 
-/// The axes that the principal moments of a body are along: as the document states them,
-/// or those of the inertia.
+/// Axes of a body's principal moments, as stated in the document or computed from the inertia.
 fn axes_of(body: &mjcf_rs::body::Body) -> UnitQuaternion<f64> {
     match &body.inertial {
         Some(inertial) if matches!(inertial.inertia, InertiaSpec::Diagonal(_)) => {
@@ -170,8 +169,10 @@ fn axes_of(body: &mjcf_rs::body::Body) -> UnitQuaternion<f64> {
     }
 }
 
-/// The frame of every sensor. A sensor of another kind is no reason to refuse the
-/// scene: it is refused when somebody records it.
+/// The frame of every sensor.
+///
+/// A sensor of another kind does not make the engine refuse the scene. The engine refuses to record
+/// it.
 fn frames(
     document: &mjcf_rs::Model,
     layout: &Layout,
@@ -240,7 +241,7 @@ impl Compiled {
         Ok(())
     }
 
-    /// What a target changes, and its value in the scene.
+    /// The quantity that a target changes, and its value in the scene.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a target that this engine does not know.

@@ -1,12 +1,12 @@
-//! What this engine would have to ignore, looked for by name and refused.
+//! Finds by name what this engine would have to ignore, and refuses it.
 //!
-//! The lists are of what is known: whatever else a document says is refused, so that
-//! nothing which changes the motion is left out in silence.
+//! The lists hold what is known. The engine refuses everything else in a document, so that it never
+//! silently ignores something that changes the motion.
 
 use asid_core::{Scene, mjcf_rs};
 use roxmltree::{Document, Node};
 
-/// Sections of a document that this engine reads, or that hold no physics.
+/// Sections of a document that this engine reads, or that contain no physics.
 const SECTIONS: [&str; 12] = [
     "compiler",
     "option",
@@ -22,7 +22,7 @@ const SECTIONS: [&str; 12] = [
     "custom",
 ];
 
-/// Attributes of `<option>` that this engine reads, or that say how others compute.
+/// Attributes of `<option>` that this engine reads, or that concern the numerics of other engines.
 const OPTIONS: [&str; 11] = [
     "timestep",
     "gravity",
@@ -37,14 +37,14 @@ const OPTIONS: [&str; 11] = [
     "jacobian",
 ];
 
-/// What of a document this engine lacks, in words; `None` where it can fly all of it.
+/// Describes what this engine lacks for a document; `None` if it can simulate all of it.
 #[must_use]
 pub fn lacking(scene: &Scene, model: &mjcf_rs::Model) -> Option<String> {
     of_document(scene).or_else(|| of_bodies(model))
 }
 
 fn of_document(scene: &Scene) -> Option<String> {
-    // A document that cannot be read has been refused before.
+    // A document that cannot be parsed has already been refused.
     let document = Document::parse(scene.xml()).ok()?;
     let elements = |node: Node<'_, '_>| node.children().any(|child| child.is_element());
     let sections = document.root_element().children();

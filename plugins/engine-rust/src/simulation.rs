@@ -8,10 +8,10 @@ use asid_core::{Rollout, Status};
 use crate::flight::{Body, Load, Motion, step};
 use crate::model::{Column, Compiled};
 
-/// Largest number that counts as a state.
+/// Largest magnitude of a valid state.
 const HUGE: f64 = 1e10;
 
-/// One simulation: its state, and the world as its parameters make it.
+/// One simulation: its state, and the world with its parameters.
 #[derive(Clone)]
 pub struct Simulation {
     /// State.
@@ -20,7 +20,7 @@ pub struct Simulation {
     gravity: Vector3<f64>,
 }
 
-/// What a snapshot keeps.
+/// The content of a snapshot.
 #[derive(Clone)]
 pub struct State {
     /// Simulated time, s.
@@ -29,12 +29,12 @@ pub struct State {
     pub qpos: Vec<f64>,
     /// Velocities.
     pub qvel: Vec<f64>,
-    /// Whether it runs.
+    /// Whether it runs or has diverged.
     pub status: Status,
 }
 
 impl Simulation {
-    /// A simulation at the scene's start with nominal parameters.
+    /// A simulation at the scene's initial state with nominal parameters.
     pub fn new(compiled: &Compiled) -> Self {
         Self {
             state: State {
@@ -48,7 +48,7 @@ impl Simulation {
         }
     }
 
-    /// Sets a parameter to a value that it can take.
+    /// Sets a parameter to a valid value.
     pub fn set(&mut self, compiled: &Compiled, column: Column, value: f64) {
         match column {
             Column::Gravity(i) => self.gravity[i] = value,
@@ -62,7 +62,7 @@ impl Simulation {
         }
     }
 
-    /// Readings of the present state.
+    /// Writes the readings of the present state.
     pub fn record(&self, compiled: &Compiled, record: &Recording, out: &mut [f64]) {
         for (i, channel) in record.channels().iter().enumerate() {
             let out = &mut out[record.range(i)];

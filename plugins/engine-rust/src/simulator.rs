@@ -1,4 +1,4 @@
-//! A batch: whole-batch calls, each simulation on its own, on several threads.
+//! A batch: whole-batch calls over independent simulations, on several threads.
 
 use std::sync::Arc;
 
@@ -19,18 +19,18 @@ pub struct FlightSimulator {
     steps: u64,
 }
 
-/// States with the scene that they are of.
+/// Saved states, and the scene to which they belong.
 struct Saved {
     compiled: Arc<Compiled>,
     states: Vec<State>,
 }
 
 impl FlightSimulator {
-    /// Makes a batch.
+    /// Creates a batch.
     ///
     /// # Errors
-    /// [`Error::Config`] for no simulations, [`Error::Parameter`] for a target that
-    /// this engine does not know.
+    /// [`Error::Config`] without simulations, [`Error::Parameter`] for a target that this engine
+    /// does not know.
     pub fn new(compiled: Arc<Compiled>, config: &BatchConfig) -> Result<Self> {
         if config.size == 0 {
             return Err(Error::Config {
@@ -53,7 +53,7 @@ impl FlightSimulator {
         Ok(batch)
     }
 
-    /// The public copy of the statuses, after states have changed.
+    /// Updates the public copy of the statuses after states have changed.
     fn publish(&mut self, sims: &[usize]) {
         for &sim in sims {
             self.status[sim].clone_from(&self.sims[sim].state.status);
@@ -61,7 +61,7 @@ impl FlightSimulator {
     }
 }
 
-/// A value that a parameter can take.
+/// Checks that a parameter can take a value.
 fn check_value(column: Column, value: f64) -> Result<()> {
     let (parameter, fits) = match column {
         Column::Gravity(_) => ("option/gravity", value.is_finite()),
@@ -150,7 +150,7 @@ impl Simulator for FlightSimulator {
                 check_value(self.columns[change.column], value)?;
             }
         }
-        // Free bodies have no drives, so there are no commands to follow.
+        // Free bodies have no actuators, so there are no commands to apply.
         let (Control::Shared(_) | Control::PerSimulation(_)) = rollout.control;
         let length = rollout.frames * rollout.record.width();
         let mut wanted = rollout.sims.iter().peekable();

@@ -1,16 +1,15 @@
 //! Multisine exploration: the classical input of system identification.
 //!
-//! Every entry of the action is a sum of sines at whole multiples of one over the
-//! episode's length, equally strong, with random phases, scaled so that its peak is
-//! a share of the entry's range:
+//! Every entry of the action is a sum of sines with equal amplitudes and random phases. Their
+//! frequencies are integer multiples of one over the episode's length. The sum is scaled so that
+//! its peak is a share of the entry's range:
 //!
 //! `u(t) = center + amplitude / peak * half range * sum_k sin(2 pi k t / T + phase_k)`
 //!
-//! It excites a band of frequencies evenly and persistently (order twice the number of
-//! sines), knows nothing of the task, and costs nothing. Of several draws of the phases the
-//! one with the smallest peak is taken, so that the most power fits into the range. Source:
-//! Pintelon and Schoukens, System Identification: A Frequency Domain Approach (2012),
-//! section 2.2.
+//! It excites a frequency band evenly and persistently (order twice the number of sines), knows
+//! nothing of the task, and costs nothing. Of several draws of the phases it takes the one with the
+//! smallest peak, so that the most power fits into the range. Source: Pintelon and Schoukens,
+//! System Identification: A Frequency Domain Approach (2012), section 2.2.
 
 use std::f64::consts::TAU;
 
@@ -81,7 +80,7 @@ impl Multisine {
     /// The actions of an episode, `horizon x action`, in the task's units.
     fn plan(&self, protocol: &ExplorationProtocol, rng: &mut Rng) -> Result<Vec<f64>> {
         let steps = protocol.horizon;
-        // Beyond half the steps a sine looks like a slower one.
+        // A sine with more periods than half the steps would alias to a slower one.
         if 2 * self.highest > steps {
             return Err(Error::Config {
                 key: "explorer.highest".into(),
@@ -143,7 +142,7 @@ impl Explorer for Multisine {
     }
 }
 
-/// Plays a plan, whatever the readings say.
+/// Plays a plan and ignores the readings.
 struct OpenLoop {
     width: usize,
     plan: Vec<f64>,
@@ -185,7 +184,7 @@ mod tests {
         }
     }
 
-    /// Power of an entry at `k` periods an episode, relative to that of a sine of peak 1.
+    /// Power of an entry at `k` periods per episode, relative to that of a sine with peak 1.
     fn power(plan: &[f64], entry: usize, k: usize) -> f64 {
         let (mut re, mut im) = (0.0, 0.0);
         for (step, row) in plan.chunks_exact(2).enumerate() {

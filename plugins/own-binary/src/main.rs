@@ -1,4 +1,4 @@
-//! The whole command line of asid, and a task of one's own.
+//! The complete command line of asid with a custom task.
 
 use payload_swing as _;
 

@@ -1,9 +1,9 @@
-//! Payload swing: an arm with an unknown payload is to swing up to a set angle in one go.
+//! Payload swing: an arm with an unknown payload must swing up to a set angle in one motion.
 //!
-//! The unknowns are the payload's mass and the damping of the bearing. Exploration moves
-//! the arm by torques for two seconds, weak ones: only in time with its own period do they
-//! move it enough to tell the mass. The task is one pulse of the motor, half a second
-//! long, after which the arm swings on by itself; its torque must fit the payload.
+//! The unknowns are the payload's mass and the damping of the bearing. Exploration moves the arm
+//! for two seconds by weak torques. Only torques at the arm's own period move it enough to identify
+//! the mass. The task is one motor pulse of half a second, after which the arm swings freely; the
+//! torque must fit the payload.
 
 use std::collections::BTreeMap;
 
@@ -21,11 +21,11 @@ const NAME: &str = "payload-swing";
 /// One line for `asid list`.
 const ABOUT: &str = "weigh a payload by swinging it, then swing it to a set angle";
 
-/// Largest distance of the swing's peak from the goal that is a success, rad.
+/// Largest distance between the swing's peak and the goal in a success, rad.
 const THRESHOLD: f64 = 0.05;
 /// Length of a frame, s.
 const FRAME_PERIOD: f64 = 0.02;
-/// Frames of the pulse, and of the whole attempt.
+/// Frames of the pulse and of the whole attempt.
 const FRAMES: [usize; 2] = [25, 75];
 
 asid_core::register!(TaskEntry {
@@ -39,11 +39,11 @@ asid_plugin::export_plugin!();
 /// The task.
 pub struct PayloadSwing {
     spec: TaskSpec,
-    /// Angle that the swing is to reach, rad.
+    /// Angle that the swing must reach, rad.
     goal: f64,
 }
 
-/// What can be set of how hard it is.
+/// Settings of the difficulty.
 fn difficulties() -> Vec<Difficulty> {
     let about = "angle that the swing is to reach";
     vec![Difficulty::new("goal", "rad", 0.6, [0.3, 0.9], about)]
@@ -53,12 +53,12 @@ impl PayloadSwing {
     /// The task with its ranges.
     ///
     /// # Errors
-    /// When the scene that is built in cannot be read.
+    /// If the built-in scene cannot be read.
     pub fn new() -> Result<Self> {
         Self::at(&Levels::new(difficulties()))
     }
 
-    /// The task at some levels of difficulty.
+    /// The task at given levels of difficulty.
     fn at(levels: &Levels) -> Result<Self> {
         let goal = levels.get("goal")?;
         let angle = Signal {
@@ -162,7 +162,7 @@ impl Task for PayloadSwing {
     }
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
-        // `max` would pass over the NaN of a simulation that diverged.
+        // `max` would ignore the NaN of a diverged simulation.
         let highest = |a: f64, &b: &f64| if a > b { a } else { b };
         let error = (readings.iter().fold(f64::NEG_INFINITY, highest) - self.goal).abs();
         Outcome {
@@ -178,7 +178,7 @@ impl Task for PayloadSwing {
     }
 
     fn settings(&self, section: &str, algorithm: &str) -> Settings {
-        // One number is sought: fewer candidates find it.
+        // The search has one dimension, so fewer candidates suffice.
         match (section, algorithm) {
             ("solver", "cem") => Settings::from_iter([("population".to_owned(), 16.into())]),
             _ => Settings::new(),

@@ -1,14 +1,15 @@
-//! The task cannot be solved without knowing the payload, and always can with knowing it.
+//! With knowledge of the unknowns the task can always be solved; no single torque solves it for
+//! most of them.
 
 #![allow(clippy::unwrap_used)]
 
 use asid_core::{Backend as _, BatchConfig, Control, Rollout, Task};
 use payload_swing::PayloadSwing;
 
-/// Torques that are tried: from 0 to the motor's limit.
+/// Number of torques that are tried, from 0 to the motor's limit.
 const TORQUES: usize = 76;
 
-/// For each truth (mass in kg, damping in N m s/rad): which torques succeed.
+/// For each true value (mass in kg, damping in N m s/rad), which torques succeed.
 fn successes(truths: &[[f64; 2]]) -> Vec<Vec<bool>> {
     let task = PayloadSwing::new().unwrap();
     let model = asid_rapier::Rapier.load(task.scene()).unwrap();
