@@ -105,7 +105,6 @@ impl Workload {
     ///
     /// # Errors
     /// If the layout is not that of the task's scene.
-    /// When the layout is not that of the task's scene.
     pub fn new(
         task: &dyn Task,
         layout: &Layout,

@@ -4,7 +4,6 @@
 //! afternoon. All effects at all sites are ranked by one linearisation each. The leading ones are
 //! fitted by replays of the training logs, with residuals assumed white. None of them knows a
 //! label.
-//! logs, residuals taken for white noise. None of them knows a label.
 
 mod candidates;
 mod noise;
@@ -33,8 +32,8 @@ pub enum Baseline {
     IdentifyOnly,
     /// Names the single effect that leaves the smallest residual on the training logs.
     BestResidual,
-    /// Adds effects, and drops earlier ones, as long as the Bayesian information criterion (Schwarz
-    /// 1978) falls.
+    /// Adds effects, and drops earlier ones, as long as the Bayesian information criterion falls
+    /// (Schwarz 1978).
     Bic,
     /// Names nothing; a network learns the residuals.
     ResidualNetwork,

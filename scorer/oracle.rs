@@ -1,7 +1,8 @@
 //! The answer of somebody who knows the label: a check of the scorer itself.
 //!
-//! This answer is right by construction. If it is not scored as right, or if the true effects do
-//! not fit the logs of a clean world, the fault is in the scorer, the generator or the catalogue.
+//! This answer is right by construction. If it is not scored as right, the fault is in the scorer,
+//! the generator or the catalogue. The same holds if the true effects do not fit the logs of a
+//! clean world.
 
 use crate::answer::{
     Answer, EffectValues, Hypothesis, ParameterEstimate, Place, Verdict, WiringFound,

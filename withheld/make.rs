@@ -5,10 +5,10 @@
 //! DIR/studies/case-0000/           study.toml, nominal.xml, train_*.csv, test_*.csv
 //! DIR/sealed/labels.json           labels and salts; readable by the owner alone
 //! DIR/sealed/set.json              half, seed, count
-//! DIR/sealed/case-0000.json        label of a case that is made, until the set is whole
+//! DIR/sealed/case-0000.json        label of a case that is made, until the set is complete
 //! ```
-//! A diagnosis is given `DIR/studies`. A set that was interrupted goes on where it was: a case whose label lies there is
-//! not made again.
+//! A diagnosis is given `DIR/studies`. An interrupted set can be continued: a case that has a label
+//! in `DIR/sealed` is not made again.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,62 +23,63 @@ use crate::machine::{Half, Machine};
 use crate::plan::{Plan, Wanted};
 use crate::seal::{LABELS, SEAL, Seal, commitment, digest, files};
 
-/// Folder of the studies, and that of the labels.
+/// Folder of the studies.
 pub const STUDIES: &str = "studies";
 /// Folder of the labels.
 pub const SEALED: &str = "sealed";
 
-/// Name of the file that tells what set this is.
+/// Name of the file that describes the set.
 const SET: &str = "set.json";
 
-/// What set this is; for who may read the labels.
+/// Description of the set, kept with the labels.
 #[derive(PartialEq, Serialize, Deserialize)]
 struct Set {
     schema: u32,
     half: Half,
     seed: u64,
     count: usize,
-    /// Machines that others wrote.
+    /// Machines that other authors modelled.
     outside: Vec<String>,
-    /// Which cases of the wheels are taken.
+    /// Which cases of the wheels the set takes.
     #[serde(default, skip_serializing_if = "Wanted::is_all")]
     wanted: Wanted,
 }
 
-/// What set is asked for.
+/// Describes the set to be made.
 #[derive(Clone, Debug)]
 pub struct Order {
     /// Half of the machines.
     pub half: Half,
-    /// Seed of everything that is drawn.
+    /// Seed of all random draws.
     pub seed: u64,
     /// Number of cases.
     pub count: usize,
-    /// Which cases of the wheels are taken.
+    /// Which cases of the wheels the set takes.
     pub wanted: Wanted,
 }
 
-/// A case that was made.
+/// A finished case.
 struct Sealed {
     label: Label,
     seal: String,
     seconds: f64,
 }
 
-/// What was made.
+/// The result of making a set.
 #[derive(Debug, Serialize)]
 pub struct Made {
     /// Cases that were written.
     pub cases: usize,
-    /// Cases that could not be made, with the reason: no draw was usable, or MuJoCo refuses the world. They are not in the
-    /// set.
+    /// Cases that could not be made, with the reason; they are not in the set.
+    ///
+    /// Either no draw was usable, or MuJoCo refuses the world.
     pub left_out: Vec<String>,
-    /// Seconds that each case took; 0 where it was there from a run before.
+    /// Seconds that each case took; 0 if it was left by an earlier run.
     pub seconds: Vec<f64>,
 }
 
 impl Made {
-    /// What was made, for people.
+    /// Summary lines for the user.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let mut sorted = self.seconds.clone();
@@ -96,10 +97,10 @@ impl Made {
     }
 }
 
-/// Runs something with so many threads; 0 for as many as there are cores.
+/// Runs a closure with a number of threads; 0 stands for the number of cores.
 ///
 /// # Errors
-/// Those of what is run.
+/// Returns those of the closure.
 pub fn with_threads<T: Send>(threads: usize, run: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(run),
@@ -114,7 +115,7 @@ fn failed(path: &Path, error: &impl ToString) -> Error {
     }
 }
 
-/// Writes a file whole or not at all.
+/// Writes a file completely or not at all.
 fn write(path: &Path, text: &str) -> Result<()> {
     let part = path.with_extension("part");
     std::fs::write(&part, text).map_err(|e| failed(&part, &e))?;
@@ -126,11 +127,13 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write(path, &(text + "\n"))
 }
 
-/// Makes a set of cases in a folder that is new, is empty or holds a part of the same set, of the machines of a half and of
-/// those `outside` of the project. `done` is called after each case.
+/// Makes a set of cases from the machines of a half and the machines `outside`. Calls `done` after
+/// each case.
+///
+/// The folder must be new, be empty or hold a part of the same set.
 ///
 /// # Errors
-/// Where the folder holds something else, or a file cannot be written.
+/// If the folder holds something else, or if a file cannot be written.
 pub fn make(
     folder: &Path,
     order: &Order,
@@ -207,7 +210,7 @@ pub fn make(
     })
 }
 
-/// The folders of a set's studies and of its labels, made where they are not there.
+/// The folders of a set's studies and labels; creates them if they are missing.
 fn open(folder: &Path, set: &Set) -> Result<[PathBuf; 2]> {
     let studies = folder.join(STUDIES);
     let sealed = folder.join(SEALED);
@@ -227,7 +230,7 @@ fn open(folder: &Path, set: &Set) -> Result<[PathBuf; 2]> {
     Ok([studies, sealed])
 }
 
-/// A case that a run before has made.
+/// A case that an earlier run made, if there is one.
 fn kept(name: &str, study: &Path, label: &Path) -> Result<Option<Sealed>> {
     let Ok(text) = std::fs::read_to_string(label) else {
         return Ok(None);
@@ -240,7 +243,7 @@ fn kept(name: &str, study: &Path, label: &Path) -> Result<Option<Sealed>> {
     }))
 }
 
-/// Makes a case and writes its study and then its label.
+/// Makes a case; writes its study, then its label.
 fn case(
     plan: &Plan,
     (seed, number): (u64, usize),
@@ -250,7 +253,7 @@ fn case(
     let clock = std::time::Instant::now();
     let case = case::make(plan, seed, number)?;
     if study.exists() {
-        // What an interrupted run left of it.
+        // Remove what an interrupted run left.
         std::fs::remove_dir_all(study).map_err(|e| failed(study, &e))?;
     }
     std::fs::create_dir_all(study).map_err(|e| failed(study, &e))?;
@@ -265,7 +268,7 @@ fn case(
     })
 }
 
-/// Lets nobody but the owner read a folder.
+/// Makes a folder readable by its owner alone.
 #[cfg(unix)]
 fn close(folder: &Path) -> Result<()> {
     use std::os::unix::fs::PermissionsExt;
@@ -273,7 +276,7 @@ fn close(folder: &Path) -> Result<()> {
     std::fs::set_permissions(folder, owner).map_err(|e| failed(folder, &e))
 }
 
-/// Where there are no such permissions the folder is only apart.
+/// On systems without such permissions the folder is only separate.
 #[cfg(not(unix))]
 fn close(_folder: &Path) -> Result<()> {
     Ok(())
