@@ -49,12 +49,17 @@ pub(crate) fn parts(
     for trial in &data.trials {
         let marginal = marginal(replayer, layout, data, trial, &theta)?;
         let mut beside = vec![theta.clone()];
+        let bound = Parameter::scaled_bound();
+        let mut widths = Vec::with_capacity(steps.len());
         for (k, step) in steps.iter().enumerate() {
-            for sign in [1.0, -1.0] {
+            // At an end of a range the difference is one-sided.
+            let ends = [1.0, -1.0].map(|sign| (point[k] + sign * step).clamp(-bound, bound));
+            for end in ends {
                 let mut z = point.to_vec();
-                z[k] += sign * step;
+                z[k] = end;
                 beside.push(values(parameters, &z));
             }
+            widths.push(ends[0] - ends[1]);
         }
         let points: Vec<_> = beside.iter().map(|t| (&t[..], &marginal.start)).collect();
         let rows = replayer.residuals(data, trial, &points)?;
@@ -65,10 +70,10 @@ pub(crate) fn parts(
             .iter()
             .map(|r| DVector::from_vec(marginal.apply(r)))
             .collect();
-        let slopes: Vec<DVector<f64>> = steps
+        let slopes: Vec<DVector<f64>> = widths
             .iter()
             .enumerate()
-            .map(|(k, step)| (&rows[2 * k + 1] - &rows[2 * k + 2]) / (2.0 * step))
+            .map(|(k, width)| (&rows[2 * k + 1] - &rows[2 * k + 2]) / *width)
             .collect();
         let slopes = DMatrix::from_columns(&slopes);
         parts.push(Part {

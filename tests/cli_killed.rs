@@ -109,13 +109,23 @@ fn watches(process: u32) -> bool {
     mask.is_some_and(|m| m & 0b10 != 0)
 }
 
-/// Symptom: Ctrl-C ends a run or an exploration without a message.
+/// Symptom: Ctrl-C ends a run, an exploration or a training without a message.
 #[test]
 #[cfg(target_os = "linux")]
 fn ctrl_c_says_what_was_stopped_and_that_nothing_was_written() {
-    for (command, what) in [("run", "the run of"), ("explore", "the exploration of")] {
+    let mut calls = vec![
+        ("run", "--out out", "the run of rod-balancing"),
+        ("explore", "--out out", "the exploration of rod-balancing"),
+    ];
+    if cfg!(feature = "torch") {
+        let train = "--explorer fisher-ppo --train policy.safetensors";
+        calls.push(("explore", train, "the training of fisher-ppo"));
+    }
+    for (command, options, what) in calls {
         let place = Workplace::new();
-        let mut call = place.asid(&[command, "rod-balancing", "--quiet", "--out", "out"]);
+        let mut arguments = vec![command, "rod-balancing", "--quiet"];
+        arguments.extend(options.split(' '));
+        let mut call = place.asid(&arguments);
         let mut child = call.stderr(std::process::Stdio::piped()).spawn().unwrap();
         while !watches(child.id()) && child.try_wait().unwrap().is_none() {
             std::thread::yield_now();
@@ -129,7 +139,7 @@ fn ctrl_c_says_what_was_stopped_and_that_nothing_was_written() {
         let said = String::from_utf8_lossy(&done.stderr);
         assert_eq!(done.status.code(), Some(130), "{said}");
         assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-        let expected = format!("{what} rod-balancing was stopped");
+        let expected = format!("{what} was stopped");
         assert!(
             said.contains(&expected) && said.contains("nothing was written"),
             "{said}"

@@ -109,6 +109,32 @@ fn the_trajectory_form_is_the_derivative_of_the_trajectory() {
     }
 }
 
+/// Symptom: an estimate far beyond the prior's range takes away all information, that about other
+/// unknowns too. Cause: both copies are at the end of the range, and their difference is 0/0.
+#[test]
+fn an_estimate_beyond_the_range_has_the_information_of_its_end() {
+    let one = settings(Form::Trajectory, false);
+    for entry in all::<BackendEntry>() {
+        let backend = (entry.make)().unwrap();
+        let parameters = [Cart::mass(Scale::Linear)];
+        task_support::on_engine(&*backend, &Cart::new(), &parameters, 0, |problem, _| {
+            let told = |mass: f64| {
+                let mut batch = FisherBatch::new(problem, &one, 1).unwrap();
+                let (mut reading, mut reward) = ([0.0], [0.0]);
+                batch.begin(&[mass], &[0.02], &mut reading).unwrap();
+                for _ in 0..HORIZON {
+                    batch.step(&[FORCE], &mut reading, &mut reward).unwrap();
+                }
+                batch.information()[0].trace()
+            };
+            let [_, end] = parameters[0].range;
+            let at_the_end = told(end);
+            assert!(at_the_end > 0.0, "{}: {at_the_end}", entry.name);
+            close(entry.name, told(1.3 * end), at_the_end, 1e-9);
+        });
+    }
+}
+
 #[test]
 fn the_one_step_form_is_the_derivative_of_a_step() {
     // Each step begins from the same state, velocity included. It therefore differs only by what

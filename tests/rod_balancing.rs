@@ -7,8 +7,11 @@
 mod task_support;
 
 use asid::algorithms::fisher::FisherSettings;
+use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
 use asid::algorithms::identify::Likelihood;
+use asid::core::identify::Assumptions;
 use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, all, find};
+use asid::core::tracker::TrackerPrior;
 use asid::core::{Control, Policy, Problem, RealWorld, Rollout};
 use asid::pipeline::episode_information;
 use asid::worlds::SimulatedWorld;
@@ -135,6 +138,38 @@ fn a_push_tells_the_friction_too() {
             );
         });
     }
+}
+
+/// Symptom: the deviation that a run expects of an episode is that of a tracker which reads every
+/// frame, however slow the tracker is.
+#[test]
+fn what_a_run_expects_of_a_slow_tracker_is_less() {
+    let task = task_support::task("rod-balancing");
+    let std = |rate: f64| {
+        let set = std::iter::once(("tracker_rate".to_owned(), rate)).collect();
+        let task = task.adjusted(&set).unwrap().unwrap();
+        let backend = (all::<BackendEntry>()[0].make)().unwrap();
+        let mut out = f64::NAN;
+        task_support::on_engine(&*backend, &*task, &task.parameters(), 3, |problem, _| {
+            let actions = [vec![[0.02, 0.03]; 5], vec![[0.025, 0.0]; 15]]
+                .concat()
+                .concat();
+            // Noise alone: systematic errors and roughness do not average out.
+            let settings = ExpectedSettings {
+                assumes: Assumptions {
+                    correlated: true,
+                    tracker: TrackerPrior::NONE,
+                },
+                ..ExpectedSettings::default()
+            };
+            let start = [0.55, 0.0, 0.2];
+            let told = expected_deviation(problem, &settings, &[0.05], &start, &actions);
+            out = told.unwrap().unwrap().last().unwrap()[0];
+        });
+        out
+    };
+    let ratio = std(10.0) / std(50.0);
+    assert!((1.4..2.7).contains(&ratio), "{ratio}");
 }
 
 /// Fewer or noisier readings are less informative, in proportion to their number and noise.

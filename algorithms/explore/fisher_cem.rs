@@ -122,7 +122,7 @@ impl Planner for FisherCem {
             curve.push(CurvePoint::of(iteration + 1, &returns));
         }
         finalists.push(cem.mean().to_vec());
-        finalists.truncate(self.population);
+        let finalists = latest(finalists, self.population);
         let samples = self.population * self.prior_samples / finalists.len();
         let returns = trials.returns(&finalists, samples.max(1), &mut rng)?;
         problem.progress.end();
@@ -137,6 +137,12 @@ impl Planner for FisherCem {
 /// The final comparison simulates each plan at about this many times the search's prior samples; it
 /// has correspondingly fewer plans.
 const FINAL: usize = 4;
+
+/// The last of some plans, `most` of them: the search improves from one iteration to the next.
+fn latest(mut plans: Vec<Vec<f64>>, most: usize) -> Vec<Vec<f64>> {
+    plans.drain(..plans.len().saturating_sub(most));
+    plans
+}
 
 /// Simulates candidate plans.
 struct Trials<'a> {
@@ -209,5 +215,19 @@ impl Explorer for FisherCem {
     ) -> Result<Explored<'a>> {
         let objective = self.fisher.describe();
         Planned::explored(self, problem, start, objective)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: with more iterations than plans in the final comparison, the last iterations and
+    /// the mean of the search are never compared.
+    #[test]
+    fn the_final_comparison_has_the_latest_plans() {
+        let plans: Vec<Vec<f64>> = (0..5).map(|i| vec![f64::from(i)]).collect();
+        assert_eq!(latest(plans.clone(), 2), [[3.0], [4.0]]);
+        assert_eq!(latest(plans.clone(), 8), plans);
     }
 }

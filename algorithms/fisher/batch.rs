@@ -46,6 +46,18 @@ pub struct FisherBatch<'a> {
     alive: Vec<bool>,
 }
 
+/// The value of an unknown, or the end of its range if it lies beyond.
+///
+/// An identifier may leave the prior's range. Beyond an end both copies would be that end, and
+/// their difference would tell nothing.
+fn within_range(parameter: &Parameter, value: f64) -> f64 {
+    let (z, bound) = (parameter.to_scaled(value), Parameter::scaled_bound());
+    if z.abs() <= bound || parameter.is_binary() {
+        return value;
+    }
+    parameter.from_scaled(z.clamp(-bound, bound))
+}
+
 impl<'a> FisherBatch<'a> {
     /// Prepares `episodes` simultaneous episodes.
     ///
@@ -139,13 +151,20 @@ impl<'a> FisherBatch<'a> {
         let mut all_theta = Vec::with_capacity(self.sims.len() * d);
         let mut all_starts = Vec::with_capacity(self.sims.len() * k);
         for e in 0..self.episodes {
-            let (t, s) = (&theta[e * d..(e + 1) * d], &starts[e * k..(e + 1) * k]);
-            all_theta.extend_from_slice(t);
+            let t: Vec<f64> = self
+                .problem
+                .parameters
+                .iter()
+                .zip(&theta[e * d..])
+                .map(|(p, value)| within_range(p, *value))
+                .collect();
+            let s = &starts[e * k..(e + 1) * k];
+            all_theta.extend_from_slice(&t);
             all_starts.extend_from_slice(s);
             for entry in 0..self.entries {
                 let mut taken = 0.0;
                 for sign in [1.0, -1.0] {
-                    let (mut t, mut s) = (t.to_vec(), s.to_vec());
+                    let (mut t, mut s) = (t.clone(), s.to_vec());
                     if let Some(parameter) = self.problem.parameters.get(entry) {
                         let bound = Parameter::scaled_bound();
                         let z = parameter.to_scaled(t[entry]);

@@ -19,7 +19,7 @@ use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
 use asid_core::simulator::{Control, Rollout};
-use asid_core::tracker::TrackerPrior;
+use asid_core::tracker::{ReadingFrames, TrackerPrior};
 use asid_readings::{SignalSet, SystematicErrors};
 
 /// Settings of the computation of expected standard deviations.
@@ -271,11 +271,17 @@ impl<'a> Episode<'a> {
             .map(|k| k as f64 * protocol.frame_period)
             .collect();
         let systematic = SystematicErrors::at(tracker, &self.signals, &time, &all);
-        let there = vec![true; (1 + frames) * len];
+        // A slow tracker has no reading in some frames.
+        let read = ReadingFrames::of(self.problem.task, protocol.frame_period);
+        let is_read = (0..=frames).map(|frame| read.has(frame));
+        let there: Vec<bool> = is_read.flat_map(|is| vec![is; len]).collect();
         let mut of = |s: usize| -> Option<Vec<f64>> {
             let mut out = Vec::with_capacity((1 + frames) * len);
-            for (a, b) in row(s).zip(row(0)) {
+            for (frame, (a, b)) in row(s).zip(row(0)).enumerate() {
                 self.signals.difference(a, b, &mut whitened);
+                if !read.has(frame) {
+                    whitened.fill(0.0);
+                }
                 out.extend_from_slice(&whitened);
             }
             systematic.whiten(&there, &mut out);

@@ -82,13 +82,14 @@ impl UpdateRule for CemSettings {
         draws: &[Vec<f64>],
         costs: &[f64],
     ) -> Option<Gaussian> {
-        let order = ranked(costs);
-        let count = ((costs.len() as f64 * self.elite_fraction).round() as usize)
-            .clamp(2.min(costs.len()), costs.len());
-        let elite = &order[..count];
-        if elite.is_empty() {
+        let mut order = ranked(costs);
+        order.retain(|&draw| costs[draw].is_finite());
+        if order.len() < 2 {
             return None;
         }
+        let count = (costs.len() as f64 * self.elite_fraction).round() as usize;
+        let count = count.clamp(2, order.len());
+        let elite = &order[..count];
         let keep = self.smoothing;
         let (mut means, mut stds) = (present.mean().to_vec(), present.std());
         for i in 0..means.len() {

@@ -182,6 +182,24 @@ mod tests {
         edge(CmaEsSettings::default());
     }
 
+    /// Symptom: CEM refits its distribution to failed draws where few succeed.
+    #[test]
+    fn an_elite_has_no_failed_draws() {
+        let after = |costs: &[f64]| {
+            let rule = CemSettings {
+                elite_fraction: 0.5,
+                smoothing: 0.0,
+                ..CemSettings::default()
+            };
+            let mut search = Search::new(rule, &[0.0], &[1.0], &[-3.0], &[3.0]);
+            search.tell(&[vec![1.0], vec![2.0], vec![-2.0], vec![3.0]], costs);
+            search.mean()[0]
+        };
+        assert_eq!(after(&[f64::NAN, 0.5, f64::INFINITY, 0.6]), 2.5);
+        // One draw is no distribution.
+        assert_eq!(after(&[f64::NAN, 0.5, f64::INFINITY, f64::NAN]), 0.0);
+    }
+
     #[test]
     fn failures_teach_nothing() {
         fn fails<R: UpdateRule>(rule: R) {

@@ -9,6 +9,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, find};
 use asid_learned::learning::events_of;
 use asid_learned::{Description, Saved};
 
+use super::interrupt;
 use super::options::Common;
 use super::session::Session;
 
@@ -45,6 +46,7 @@ pub fn learned_from(session: &mut Session, explorer: &str) -> Result<()> {
 pub fn explorer(session: &Session, common: &Common, file: &Path) -> Result<()> {
     let component = &session.config.explorer;
     let explorer = (find::<ExplorerEntry>(&component.name)?.make)(&component.settings)?;
+    interrupt::watch(&format!("the training of {}", component.name))?;
     let learned = explorer.train(&session.problem(), file)?;
     finish(learned, "explorer", &component.name, common, file)
 }
@@ -67,6 +69,7 @@ pub fn identifier(session: &Session, common: &Common, file: &Path) -> Result<()>
     }
     let explorer = (find::<ExplorerEntry>(&config.explorer.name)?.make)(&config.explorer.settings)?;
     let identifier = (find::<IdentifierEntry>(&component.name)?.make)(&component.settings)?;
+    interrupt::watch(&format!("the training of {}", component.name))?;
     let learned = identifier.train(&session.problem(), &*explorer, file)?;
     finish(learned, "identifier", &component.name, common, file)
 }
@@ -80,6 +83,7 @@ fn finish(learned: bool, kind: &str, name: &str, common: &Common, file: &Path) -
         }
         .into());
     }
+    *interrupt::writing() = true;
     let mut stdout = std::io::stdout().lock();
     // A plugin may save another format.
     let Ok(Saved { description, .. }) = Saved::load(file) else {
