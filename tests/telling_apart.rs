@@ -92,17 +92,50 @@ fn one_explanation_cannot_be_told_apart() {
     });
 }
 
-#[test]
-fn a_task_is_run_diagnosed_and_run_again() {
-    let place = Workplace::new();
-    // A catalogue of two effects keeps the test short.
+/// Options that leave a catalogue of two effects, which keeps a test short.
+fn two_effects() -> Vec<&'static str> {
     let kept = ["actuator-bias", "sensor-bias"];
-    let without: Vec<&str> = all::<EffectEntry>()
+    all::<EffectEntry>()
         .iter()
         .map(|e| e.name)
         .filter(|n| !kept.contains(n))
         .flat_map(|n| ["--without", n])
-        .collect();
+        .collect()
+}
+
+/// Symptom: where the search used up its time, the task was not tried again. Cause: the end of the
+/// time was taken for an interruption.
+#[test]
+fn a_task_is_tried_again_when_the_time_of_the_search_is_up() {
+    let place = Workplace::new();
+    let call = [
+        "diagnose",
+        "--task",
+        "shuffleboard",
+        "--minutes",
+        "1e-4",
+        "--runs",
+        "2",
+        "--seeds",
+        "1",
+        "--set",
+        "logs=exploration",
+        "--out",
+        "a",
+    ];
+    let output = place.run(&tiny(&[&call[..], &two_effects()[..]].concat()));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    assert!(errors.contains("the time is up"), "{errors}");
+    let result: Value = serde_json::from_str(&place.read("a/result.json")).unwrap();
+    let trials = result["real_world"]["trials"].as_array().unwrap();
+    assert_eq!(trials[0]["values"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn a_task_is_run_diagnosed_and_run_again() {
+    let place = Workplace::new();
+    let without = two_effects();
     let call = [
         "diagnose",
         "--task",

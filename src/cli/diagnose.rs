@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Result;
-use asid_core::{Backend, Progress as _, Target};
+use asid_core::{Backend, Target};
 use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
@@ -63,8 +63,8 @@ pub struct Arguments {
     /// [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// Answer after about this time with what is known by then; result.json lists the explanations
-    /// not tried. Ctrl-C does the same [default: 1.5]
+    /// Answer after about this time, or at Ctrl-C, with what is known by then; result.json lists
+    /// what was not tried. Runs of a task take their own time [default: 1.5]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
     /// Repeat the diagnosis on simulated logs for as long as --minutes allows, and tell how often
@@ -131,7 +131,7 @@ pub fn machine(study: &Study, engine: &str, threads: usize) -> Result<Machine> {
 pub fn diagnose(arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
     let (config, of_run) = Config::resolve(arguments)?;
-    let progress = Live::new(common.quiet, config.minutes);
+    let mut progress = Live::new(common.quiet, config.minutes);
     let world = of_run
         .map(|of_run| {
             let (algorithms, worlds) = (&arguments.algorithms, &arguments.worlds);
@@ -165,7 +165,7 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     let (mut diagnosis, work) = diagnose_study(&study, machine, config.settings(), &progress)?;
     let mut experiments = None;
     if let (Some(world), Some(n @ 1..)) = (&world, config.experiments)
-        && !progress.is_stopped()
+        && !progress.is_interrupted()
         && let Some(played) = world.tell_apart(&work, n, &progress)?
     {
         let (train, test) = world.logs(&runs);
@@ -179,10 +179,11 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         ));
         study = config.study(Some(logs))?;
         let again = self::machine(&study, &config.backend, common.threads.unwrap_or(0))?;
+        progress.start();
         diagnosis = diagnose_study(&study, again, config.settings(), &progress)?.0;
     }
     drop(work);
-    if progress.is_stopped() && world.is_some() {
+    if progress.is_interrupted() && world.is_some() {
         diagnosis.result.not_tried.push(NotTried {
             stage: "experiments, and the task before and after".into(),
             effects: Vec::new(),

@@ -29,7 +29,9 @@ pub struct Live {
     bars: Bars,
     quiet: bool,
     begun: Instant,
-    /// End times of the search and of the fits.
+    /// Time limit of a diagnosis, minutes.
+    minutes: Option<f64>,
+    /// End times of the search and of the fits; none before a diagnosis starts.
     until: [Option<Instant>; 2],
     interrupted: Arc<AtomicBool>,
     told: AtomicBool,
@@ -37,26 +39,35 @@ pub struct Live {
 }
 
 impl Live {
-    /// Starts the clock; `minutes` is the time limit.
+    /// Starts the clock; `minutes` is the time limit of each diagnosis.
     pub fn new(quiet: bool, minutes: Option<f64>) -> Self {
-        let begun = Instant::now();
-        let until = |share: f64| {
-            let limit = minutes.map(|m| Duration::from_secs_f64(60.0 * share * m));
-            limit.and_then(|l| begun.checked_add(l))
-        };
         Self {
             bars: Bars::new(quiet),
             quiet,
-            begun,
-            until: [SEARCHING, FITTING].map(until),
+            begun: Instant::now(),
+            minutes,
+            until: [None; 2],
             interrupted: Arc::new(AtomicBool::new(false)),
             told: AtomicBool::new(false),
             first_table: OnceLock::new(),
         }
     }
 
-    /// From now on the first Ctrl-C ends the search, and a second one ends the process.
-    pub fn watch(&self) -> Result<()> {
+    /// Starts a diagnosis: its time limit counts from now on.
+    pub fn start(&mut self) {
+        let begun = Instant::now();
+        let minutes = self.minutes;
+        self.until = [SEARCHING, FITTING].map(|share| {
+            let limit = minutes.map(|m| Duration::from_secs_f64(60.0 * share * m));
+            limit.and_then(|l| begun.checked_add(l))
+        });
+        *self.told.get_mut() = false;
+    }
+
+    /// Starts a diagnosis. From now on the first Ctrl-C ends the search, and a second one ends the
+    /// process.
+    pub fn watch(&mut self) -> Result<()> {
+        self.start();
         let failed = |e| Error::Failed(format!("cannot watch for signals: {e}"));
         let flag = || Arc::clone(&self.interrupted);
         // The order matters: the first signal finds the flag clear, then sets it.
@@ -68,6 +79,11 @@ impl Live {
 
     fn is_past(&self, end: usize) -> bool {
         self.until[end].is_some_and(|until| Instant::now() >= until)
+    }
+
+    /// Whether Ctrl-C was pressed; `is_stopped` is also true when the time is up.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::SeqCst)
     }
 
     /// Elapsed time, s.
@@ -125,7 +141,7 @@ impl Progress for Live {
     }
 
     fn is_stopped(&self) -> bool {
-        let interrupted = self.interrupted.load(Ordering::SeqCst);
+        let interrupted = self.is_interrupted();
         let stopped = interrupted || self.is_past(0);
         if stopped && !self.quiet && !self.told.swap(true, Ordering::SeqCst) {
             let why = if interrupted {
@@ -139,7 +155,7 @@ impl Progress for Live {
     }
 
     fn is_late(&self) -> bool {
-        self.interrupted.load(Ordering::SeqCst) || self.is_past(1)
+        self.is_interrupted() || self.is_past(1)
     }
 
     fn end(&self) {
@@ -160,11 +176,28 @@ mod tests {
         live.ranking("fits", &[]);
         assert_eq!(live.seconds_to_first_table(), first);
         live.interrupted.store(true, Ordering::SeqCst);
-        assert!(live.is_stopped());
+        assert!(live.is_stopped() && live.is_interrupted());
         assert!(live.is_late());
-        let over = Live::new(true, Some(0.0));
+        let mut over = Live::new(true, Some(0.0));
+        over.start();
         assert!(over.is_stopped() && over.is_late());
-        assert!(!Live::new(true, Some(1e9)).is_stopped());
+        let mut long = Live::new(true, Some(1e9));
+        long.start();
+        assert!(!long.is_stopped());
+    }
+
+    /// Symptom: after long runs of a task the search had no time, and the task was not tried again.
+    /// Cause: the limit counted from before the runs, and its end was taken for an interruption.
+    #[test]
+    fn the_time_limit_counts_from_the_start_of_a_diagnosis_and_its_end_is_no_interruption() {
+        let mut live = Live::new(true, Some(0.0));
+        assert!(!live.is_stopped() && !live.is_late());
+        live.start();
+        assert!(live.is_stopped() && live.is_late());
+        assert!(!live.is_interrupted());
+        live.minutes = Some(1e9);
+        live.start();
+        assert!(!live.is_stopped());
     }
 
     #[test]
