@@ -40,18 +40,22 @@ pub(super) struct Given {
 
 impl Given {
     /// Mean square of residuals after the parameters have made up for what they can, to first
-    /// order.
+    /// order; infinite if a replay diverges.
     pub(super) fn left(&self, residuals: Vec<f64>) -> f64 {
         let r = DVector::from_vec(residuals);
+        let whole = r.norm_squared();
+        if !whole.is_finite() {
+            return f64::INFINITY;
+        }
         if self.slopes.ncols() == 0 || self.slopes.nrows() != r.len() {
-            return r.norm_squared();
+            return whole;
         }
         let gram = self.slopes.tr_mul(&self.slopes);
         let moment = self.slopes.tr_mul(&r);
         // Parameters that change no residual have nothing to remove.
         let taken = gram.svd(true, true).solve(&moment, f64::EPSILON.sqrt());
         let taken = taken.map_or(0.0, |x| x.dot(&moment));
-        (r.norm_squared() - taken).max(0.0)
+        (whole - taken).max(0.0)
     }
 
     /// Excess power of residuals after that.
@@ -291,5 +295,18 @@ mod tests {
         assert!((left(&[2.0, 0.0, 0.0]) - 16.0).abs() < 1e-9);
         assert!((left(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - 16.0).abs() < 1e-9);
         assert!(left(&[1.0, 1.0, 0.0, 1.0, -1.0, 0.0]) < 1e-9);
+    }
+
+    /// Symptom: a law whose replay diverges was ranked first. Cause: what the parameters make up
+    /// for was NaN, and the larger of NaN and 0 is 0.
+    #[test]
+    fn a_replay_that_diverges_leaves_infinitely_much() {
+        let residuals = || vec![3.0, f64::INFINITY, f64::INFINITY];
+        for columns in [0, 1] {
+            let slopes = DMatrix::from_element(3, columns, 1.0);
+            let given = Given { slopes };
+            assert_eq!(given.left(residuals()), f64::INFINITY);
+            assert_eq!(given.excess(residuals()), f64::INFINITY);
+        }
     }
 }
