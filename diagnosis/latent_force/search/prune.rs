@@ -187,6 +187,8 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
         smaller.fitted.theta[i] = (smaller.fitted.theta[i] + shift[k]).clamp(low, high);
     }
     let stay: Vec<usize> = (0..free.len()).filter(|k| !out.contains(k)).collect();
+    // The values are at their means now; the old distances would be those of other values.
+    smaller.fitted.ahead = vec![0.0; stay.len()];
     let covariance = conditional(&fitted.covariance, &stay, &out);
     for &c in &idle {
         smaller = without(&smaller, candidates, c);
