@@ -194,17 +194,11 @@ fn base_commands(subject: &Subject) -> Vec<f64> {
         .collect()
 }
 
-/// Largest distance of each command from its base: half of what the limits leave, on the wider
-/// side.
+/// Largest distance of each command from its base within the limits, on the wider side.
 ///
 /// It is infinite for a drive that only its joint's limits bound, and 0 for one that nothing
 /// bounds.
 fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
-    let reach = |range: Option<[f64; 2]>, base: f64| {
-        range.map_or(f64::INFINITY, |[low, high]| {
-            (high - base).max(base - low).max(0.0)
-        })
-    };
     let each = base.iter().enumerate().map(|(a, &base)| {
         let mut width = reach(limits.command[a], base);
         let Some(drive) = subject.plant.drives[a] else {
@@ -214,7 +208,8 @@ fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
         let limit = limits.joints.iter().find(|l| l.name == joint.name);
         if drive.is_position_servo() {
             let range = limit.and_then(|l| l.position);
-            width = width.min(reach(range.map(|r| r.map(|x| x * drive.gear)), base));
+            let range = range.map(|range| scaled(range, drive.gear));
+            width = width.min(reach(range, base));
         } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
             width = width.min(force.force / drive.gear.abs());
         }
@@ -226,6 +221,19 @@ fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
         }
     });
     each.collect()
+}
+
+/// Distance from `base` to the farther end of a range that contains it; infinite without a range.
+fn reach(range: Option<[f64; 2]>, base: f64) -> f64 {
+    range.map_or(f64::INFINITY, |[low, high]| {
+        (high - base).max(base - low).max(0.0)
+    })
+}
+
+/// The commands of a position servo at the ends of its joint's range, the lower first.
+fn scaled(range: [f64; 2], gear: f64) -> [f64; 2] {
+    let [a, b] = range.map(|end| end * gear);
+    [a.min(b), a.max(b)]
 }
 
 /// Lets the machine come to rest before a motion, if it does.
@@ -274,4 +282,22 @@ fn settle(
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: a motion left the joint of a servo with a negative gear at rest. Cause: the gear
+    /// turned the joint's range around, and a range with its upper end first has no reach.
+    #[test]
+    fn a_servo_with_a_negative_gear_reaches_as_far_as_one_with_a_positive_gear() {
+        let range = [-0.5, 1.0];
+        let (plus, minus) = (scaled(range, 2.0), scaled(range, -2.0));
+        assert!(plus == [-1.0, 2.0] && minus == [-2.0, 1.0], "{minus:?}");
+        for base in [0.0, 0.3] {
+            assert_eq!(reach(Some(plus), base), reach(Some(minus), -base));
+        }
+        assert_eq!(reach(Some(minus), 0.0), 2.0);
+    }
 }
