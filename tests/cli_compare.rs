@@ -395,6 +395,49 @@ fn a_folder_of_other_settings_is_not_mixed_with() {
     );
 }
 
+/// Symptom: a job array of other settings, or its printed script alone, replaced the settings of a
+/// comparison that was there. Cause: they were written without a look at the folder.
+#[test]
+fn a_job_array_of_other_settings_or_its_printed_script_changes_no_comparison() {
+    let place = Workplace::new();
+    let array = |out: &str, more: &[&str]| {
+        let call = [
+            "compare",
+            "rod-balancing",
+            "--method",
+            "dr",
+            "--condition",
+            "left",
+            "--submit",
+            "slurm",
+            "--out",
+            out,
+        ];
+        let mut command = place.asid(&tiny(&[&call[..], more].concat()));
+        // No scheduler is found: the folder is left as it was submitted.
+        command.env("PATH", "").output().unwrap()
+    };
+    let printed = array("b", &["--print-script"]);
+    assert!(printed.status.success(), "{}", said(&printed));
+    assert!(printed.stdout.starts_with(b"#!/bin/bash"));
+    assert!(place.names().is_empty(), "{:?}", place.names());
+
+    let submitted = array("a", &[]);
+    assert!(said(&submitted).contains("sbatch"), "{}", said(&submitted));
+    let settings = place.read("a/config.toml");
+    let other = ["--set", "solver.cem.elite_fraction=0.5"];
+    for more in [&other[..], &[&other[..], &["--print-script"]].concat()] {
+        let refused = array("a", more);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(
+            said(&refused).contains("choose another --out"),
+            "{}",
+            said(&refused)
+        );
+        assert_eq!(place.read("a/config.toml"), settings);
+    }
+}
+
 #[test]
 fn the_oracle_knows_a_truth_that_is_drawn_from_the_whole_prior() {
     let place = Workplace::new();
