@@ -298,7 +298,8 @@ mod tests {
     }
 
     /// Symptom: a log without the orientation that other logs have was given parts of this
-    /// orientation as readings. Cause: three columns of the prediction were skipped instead of four.
+    /// orientation as readings. Cause: three columns of the prediction were skipped instead of
+    /// four.
     #[test]
     fn a_log_without_an_orientation_gets_the_predictions_of_its_own_sensors() {
         let scene = r#"<mujoco><worldbody>
