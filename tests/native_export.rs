@@ -210,6 +210,34 @@ fn several_effects_compose() {
     assert!(without > 0.05);
 }
 
+/// Symptom: the exported document moved otherwise than the refined model where a servo had a
+/// `dampratio`.
+///
+/// Cause: the ratio stayed beside a new gain, mass or armature, and MuJoCo computed another damping
+/// from them.
+#[test]
+fn a_damping_ratio_is_written_as_the_damping_of_the_model() {
+    let own = ARM.replace(r#"kv="0.4""#, r#"dampratio="0.7""#);
+    let class = ARM
+        .replace(r#"kp="8" kv="0.4""#, r#"class="link" kp="8""#)
+        .replace(
+            r#"size="0.02"/>"#,
+            r#"size="0.02"/><position dampratio="0.7"/>"#,
+        );
+    for xml in [own, class] {
+        for values in [
+            [("actuator/hold/kp", 3.0)],
+            [("joint/elbow/armature", 0.05)],
+            [("body/lower/mass", 0.8)],
+        ] {
+            let model = refined(&xml, &values, &[]);
+            let ([_, left], [_, without]) = distances(&model, &[]);
+            assert!(left < EXACT, "{values:?}: {left} of {without}");
+            assert!(without > 1e-3, "{values:?} does nothing here: {without}");
+        }
+    }
+}
+
 #[test]
 fn what_mjcf_cannot_say_is_told_in_a_sentence() {
     let model = refined(
