@@ -199,7 +199,7 @@ impl Context<'_> {
 
 /// Mean duration of a row over all walks, s.
 fn row_seconds(walks: &[Walk]) -> f64 {
-    let seconds: f64 = walks.iter().map(|w| w.time[w.len() - 1]).sum();
+    let seconds: f64 = walks.iter().map(|w| w.time[w.len() - 1] - w.time[0]).sum();
     let rows: usize = walks.iter().map(|w| w.len() - 1).sum();
     seconds / rows.max(1) as f64
 }

@@ -168,7 +168,7 @@ pub fn fit<'p>(
         }
         let ends = stands || extent.is_out_of_reach(course.reached(), promised);
         let is_last = round + 1 == rounds || progress.is_stopped();
-        if ends || is_last || watchdog.is_out_of_steps() {
+        if ends || is_last || watchdog.is_out_of_steps() && !outcome.rose {
             break;
         }
         if outcome.astray {

@@ -38,6 +38,8 @@ pub struct RefinedSimulator {
     base: Vec<f64>,
     /// Physics steps of each simulation since its episode began.
     steps: Vec<u64>,
+    /// Those of them that the engine did not take: it began later in the episode.
+    passed: Vec<u64>,
     rows: Vec<Mutex<Row>>,
     /// Positions and speeds of all joints, and their values before simulations were placed
     /// elsewhere.
@@ -49,6 +51,7 @@ pub struct RefinedSimulator {
 #[derive(Clone)]
 struct Memory {
     steps: u64,
+    passed: u64,
     effects: Vec<Vec<f64>>,
 }
 
@@ -84,6 +87,7 @@ impl RefinedSimulator {
             columns,
             base,
             steps: vec![0; size],
+            passed: vec![0; size],
             rows: (0..size).map(|_| Mutex::default()).collect(),
         })
     }
@@ -99,12 +103,14 @@ impl RefinedSimulator {
         });
         Memory {
             steps: self.steps[sim],
+            passed: self.passed[sim],
             effects: effects.collect(),
         }
     }
 
     fn remember(&mut self, sim: usize, memory: &Memory) {
         self.steps[sim] = memory.steps;
+        self.passed[sim] = memory.passed;
         let mut row = lock(&self.rows[sim]);
         for (acting, memory) in row.iter_mut().zip(&memory.effects) {
             if let Some(acting) = acting {
@@ -117,12 +123,16 @@ impl RefinedSimulator {
         }
     }
 
-    /// Advances the time of readings of some simulations by `steps` physics steps, without a step.
+    /// Advances the time of the effects of some simulations by `steps` physics steps, without a
+    /// step.
     ///
-    /// This is for machines that are placed at each reading while effects of sensors keep their
-    /// state.
+    /// This is for simulations that begin within an episode: effects that grow with time have it
+    /// since the episode's beginning.
     pub fn pass_time(&mut self, sims: &[usize], steps: u64) {
-        sims.iter().for_each(|&sim| self.steps[sim] += steps);
+        for &sim in sims {
+            self.steps[sim] += steps;
+            self.passed[sim] += steps;
+        }
     }
 
     /// Copies the states of simulations `from` to simulations `to`, which keep their effects'
@@ -136,6 +146,7 @@ impl RefinedSimulator {
         self.inner.copy_state(from, to)?;
         for (&source, &sim) in from.iter().zip(to) {
             self.steps[sim] = self.steps[source];
+            self.passed[sim] = self.passed[source];
         }
         Ok(())
     }
@@ -178,12 +189,16 @@ impl RefinedSimulator {
 struct RowHook<'a> {
     rows: &'a [Mutex<Row>],
     sims: &'a [usize],
+    passed: &'a [u64],
+    timestep: f64,
     then: Option<&'a dyn StepHook>,
 }
 
 impl StepHook for RowHook<'_> {
     fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
-        for acting in lock(&self.rows[self.sims[row]]).iter_mut().flatten() {
+        let sim = self.sims[row];
+        view.time += self.passed[sim] as f64 * self.timestep;
+        for acting in lock(&self.rows[sim]).iter_mut().flatten() {
             acting.before_step(view);
         }
         if let Some(hook) = self.then {
@@ -260,6 +275,7 @@ impl Simulator for RefinedSimulator {
         self.inner.reset(sims)?;
         for &sim in sims {
             self.steps[sim] = 0;
+            self.passed[sim] = 0;
             lock(&self.rows[sim])
                 .iter_mut()
                 .flatten()
@@ -295,6 +311,8 @@ impl Simulator for RefinedSimulator {
         let hook = RowHook {
             rows: &self.rows,
             sims: rollout.sims,
+            passed: &self.passed,
+            timestep: self.inner.layout().timestep,
             then: rollout.hook,
         };
         let mut with = *rollout;

@@ -62,14 +62,19 @@ impl Form {
                 let p = &candidate.parameters()[i];
                 let slope = self.slopes.iter().flatten().find(|(k, _)| *k == i);
                 let [low, high] = candidate.ranges[i];
-                // A parameter without a derivative is as uncertain as it is large.
-                let width = (high - low) / 12.0_f64.sqrt();
+                let width = |[low, high]: [f64; 2]| (high - low) / 12.0_f64.sqrt();
+                let bounds = candidate.limits(i);
                 let size = if p.is_limit() {
                     self.begin[i].abs()
                 } else {
                     (self.begin[i] - p.null).abs()
                 };
-                let other = if size > 0.0 { size.min(width) } else { width };
+                // A parameter without a derivative is as uncertain as it is large.
+                let other = if size > 0.0 {
+                    size.min(width(bounds))
+                } else {
+                    width([low, high])
+                };
                 Unknown {
                     parameter,
                     center: if slope.is_some() || size > 0.0 && p.null == low {
@@ -78,7 +83,7 @@ impl Form {
                         self.begin[i]
                     },
                     deviation: slope.map_or(other, |(_, d)| *d),
-                    bounds: candidate.limits(i),
+                    bounds,
                     free,
                     is_tolerance: candidate.is_tolerance,
                 }

@@ -23,12 +23,14 @@ impl Estimate {
     #[must_use]
     pub fn rest_speeds(&self, context: &Context<'_>) -> Vec<f64> {
         let nv = context.plant().layout.nv;
+        // Segments have no variances along their rows.
+        let walks = self.smoothed.iter().zip(&context.walks);
+        let smoothed: Vec<_> = walks.filter(|(_, w)| w.segment.is_none()).collect();
         (0..nv)
             .map(|d| {
-                let mut variances: Vec<f64> = self
-                    .smoothed
+                let mut variances: Vec<f64> = smoothed
                     .iter()
-                    .flat_map(|s| s.change_variance.iter().skip(nv + d).step_by(2 * nv))
+                    .flat_map(|(s, _)| s.change_variance.iter().skip(nv + d).step_by(2 * nv))
                     .copied()
                     .collect();
                 let typical = crate::noise::median(&mut variances).unwrap_or(0.0).sqrt();

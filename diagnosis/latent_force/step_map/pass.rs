@@ -136,7 +136,7 @@ impl Part {
                     .push(theta, c.episode(self.walks[e]), &mut columns);
             }
         }
-        self.simulator.reset(&all)?;
+        self.reset_at(c, &all, 0)?;
         self.simulator.set_parameters(&all, &columns)?;
         let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
         let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
@@ -231,7 +231,7 @@ impl Part {
             }
         }
         // A simulation that failed at the row before is reset.
-        self.begin_anew(&row.sims)?;
+        self.begin_anew(c, &row.sims, k)?;
         self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
     }
 }

@@ -22,7 +22,7 @@ impl Part {
             c.columns
                 .push(theta, c.episode(self.walks[e]), &mut columns);
         }
-        self.simulator.reset(which)?;
+        self.reset_at(c, which, 0)?;
         self.simulator.set_parameters(which, &columns)?;
         let qpos: Vec<f64> = states.iter().flat_map(|s| s[..nq].to_vec()).collect();
         let qvel: Vec<f64> = states.iter().flat_map(|s| s[nq..].to_vec()).collect();

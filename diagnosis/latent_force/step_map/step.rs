@@ -220,19 +220,31 @@ impl Part {
         }
         let nominal = now.repeat(which.len());
         self.simulator.copy_state(&nominal, &row.sims)?;
-        self.begin_anew(&row.sims)?;
+        self.begin_anew(c, &row.sims, k)?;
         self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
     }
 
-    /// Resets the simulations that have failed.
-    pub(super) fn begin_anew(&mut self, sims: &[usize]) -> Result<()> {
+    /// Resets simulations, with the time of row `k` of their walks: effects that grow with time
+    /// count it from the beginning of the log.
+    pub(super) fn reset_at(&mut self, c: &Common<'_>, sims: &[usize], k: usize) -> Result<()> {
+        self.simulator.reset(sims)?;
+        for &sim in sims {
+            let walk = self.walks[sim % self.walks.len()];
+            let steps = (c.walks[walk].time[k] / c.layout.timestep).round();
+            self.simulator.pass_time(&[sim], steps as u64);
+        }
+        Ok(())
+    }
+
+    /// Resets the simulations that have failed, at row `k`.
+    pub(super) fn begin_anew(&mut self, c: &Common<'_>, sims: &[usize], k: usize) -> Result<()> {
         let status = self.simulator.status();
         let failed = sims.iter().copied().filter(|&s| !status[s].is_running());
         let failed: Vec<usize> = failed.collect();
         if failed.is_empty() {
             return Ok(());
         }
-        self.simulator.reset(&failed)
+        self.reset_at(c, &failed, k)
     }
 }
 
