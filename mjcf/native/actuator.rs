@@ -143,27 +143,6 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// Writes the gains of a servo that is no plain drive, such as one of a tendon.
-    fn write_servo(&mut self, name: &str, node: Node<'_, '_>, kp: Option<f64>, kv: Option<f64>) {
-        if kp.is_none() && kv.is_none() {
-            return;
-        }
-        let tag = node.tag_name().name();
-        if !matches!(tag, "position" | "intvelocity" | "velocity") {
-            self.leave_out(format!(
-                "actuator `{name}` is no plain motor or servo: its gains kp and kv are not written"
-            ));
-            return;
-        }
-        if let Some(kp) = kp {
-            self.markup.set_numbers(node, "kp", &[kp]);
-        }
-        if let Some(kv) = kv {
-            self.markup.remove(node, "dampratio");
-            self.markup.set_numbers(node, "kv", &[kv]);
-        }
-    }
-
     /// Writes the long form, with all numbers explicit.
     fn write_general(
         &mut self,
@@ -209,18 +188,6 @@ impl Writer<'_, '_> {
         self.markup.set_numbers(node, "forcerange", &range);
         self.markup.set(node, "forcelimited", "true");
     }
-}
-
-/// Whether an actuator, or a class's, takes its damping from a ratio; `None` if it does not say.
-///
-/// In the long form a positive slope of the bias in the speed is such a ratio.
-fn has_ratio(node: Node<'_, '_>) -> Option<bool> {
-    if node.has_attribute("kv") {
-        return Some(false);
-    }
-    let slope = || node.attribute("biasprm")?.split_whitespace().nth(2);
-    let ratio = node.attribute("dampratio").or_else(slope)?;
-    ratio.trim().parse::<f64>().ok().map(|ratio| ratio > 0.0)
 }
 
 /// Whether an actuator, or a class's, takes its damping from a ratio; `None` if it does not say.
