@@ -3,7 +3,8 @@
 //! The hash is SHA-256 over canonical TOML with sorted keys and all defaults. It leaves out what
 //! may differ among the runs of a row (seed and condition) and what the method does not use (for
 //! example the explorer of a method that does not explore). A file that a setting names enters by
-//! its content and not by its path, so a comparison has the same hashes in every folder.
+//! its content and not by its path, so a comparison has the same hashes in every folder. So do the
+//! models that a refined model is of.
 
 use std::path::Path;
 
@@ -21,6 +22,15 @@ const FILES: [(&str, &str); 4] = [
     ("explorer", "policy"),
     ("identifier", "network"),
 ];
+
+/// The key among [`FILES`] whose file may name another model.
+const MODEL: &str = "model";
+
+/// Longest chain of refined models of refined models that is followed: as many as can be opened.
+const MAX_DEPTH: usize = 8;
+
+/// Text between the path of a recorded plugin and its SHA-256.
+pub const PLUGIN_HASH: &str = "#sha256=";
 
 /// Length of a hash in hexadecimal digits: 64 bits distinguish all settings that a person makes.
 const DIGITS: usize = 16;
@@ -59,20 +69,21 @@ pub fn name_contents(table: &mut toml::Table) {
         let Some(toml::Value::String(path)) = at.and_then(|t| t.get_mut(key)) else {
             continue;
         };
-        count_contents(path);
+        let of = if key == MODEL { of_model } else { of_file };
+        count_contents(path, of);
     }
     if let Some(plugins) = table.get_mut("plugins").and_then(toml::Value::as_array_mut) {
         for plugin in plugins {
             if let toml::Value::String(path) = plugin {
-                count_contents(path);
+                count_contents(path, of_plugin);
             }
         }
     }
 }
 
 /// Replaces a file's path by the hash of its content; an unreadable file's path stays.
-fn count_contents(path: &mut String) {
-    let contents = (!path.is_empty()).then(|| of_file(Path::new(path)));
+fn count_contents(path: &mut String, of: fn(&Path) -> Option<String>) {
+    let contents = (!path.is_empty()).then(|| of(Path::new(path)));
     if let Some(contents) = contents.flatten() {
         *path = contents;
     }
@@ -88,6 +99,43 @@ fn named(name: &str) -> toml::Value {
 fn of_file(path: &Path) -> Option<String> {
     let bytes = std::fs::read(path).ok()?;
     Some(format!("sha256:{}", digest(&bytes)))
+}
+
+/// Hash of a model's file; that of a refined model covers the model it refines.
+fn of_model(path: &Path) -> Option<String> {
+    of_chain(path, MAX_DEPTH)
+}
+
+/// As [`of_model`], at most `depth` refined models deep.
+fn of_chain(path: &Path, depth: usize) -> Option<String> {
+    if path.extension().is_none_or(|e| e != "toml") {
+        return of_file(path);
+    }
+    let text = std::fs::read_to_string(path).ok()?;
+    let Ok(mut table) = text.parse::<toml::Table>() else {
+        return of_file(path);
+    };
+    if let Some(toml::Value::String(model)) = table.get_mut(MODEL)
+        && depth > 0
+    {
+        let named = path.parent().unwrap_or(Path::new("")).join(&*model);
+        if let Some(contents) = of_chain(&named, depth - 1) {
+            *model = contents;
+        }
+    }
+    Some(format!("sha256:{}", digest(table.to_string().as_bytes())))
+}
+
+/// Hash of a plugin: the recorded one, which its path ends with, else that of its file.
+fn of_plugin(path: &Path) -> Option<String> {
+    let text = path.to_str()?;
+    match text.rsplit_once(PLUGIN_HASH) {
+        Some((_, hash)) => {
+            let hash: String = hash.to_lowercase().chars().take(DIGITS).collect();
+            Some(format!("sha256:{hash}"))
+        }
+        None => of_file(path),
+    }
 }
 
 /// The hash of canonical settings (the first 16 digits of SHA-256), and their text.
@@ -185,6 +233,54 @@ mod tests {
         };
         assert_eq!(at("a", "weights"), at("b", "weights"));
         assert_ne!(at("a", "weights"), at("b", "others"));
+    }
+
+    /// Symptom: after an edit of the model that a refined model names, a row pooled runs of two
+    /// simulators. Cause: only the refined model's own text was hashed.
+    #[test]
+    fn a_refined_model_counts_by_its_whole_chain_of_files() {
+        let asid = Method::named("asid").unwrap();
+        let of = |folder: &Path, model: &str| {
+            let file = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+            file("model.xml", model);
+            file("a.toml", "model = 'model.xml'");
+            let link = folder.join("a.toml").display().to_string();
+            file("b.toml", &format!("model = '{link}'\n[[effect]]\n"));
+            let mut table = toml::Table::new();
+            let path = folder.join("b.toml").display().to_string();
+            table.insert("model".into(), path.into());
+            hash(&canonical(&table, &asid)).0
+        };
+        let [a, b] = [0, 1].map(|_| tempfile::tempdir().unwrap());
+        let first = of(a.path(), "<mujoco/>");
+        assert_eq!(first, of(b.path(), "<mujoco/>"));
+        assert_ne!(first, of(a.path(), "<mujoco model='b'/>"));
+        // A circle ends.
+        std::fs::write(a.path().join("a.toml"), "model = 'b.toml'").unwrap();
+        assert!(of_model(&a.path().join("a.toml")).is_some());
+    }
+
+    /// Symptom: one plugin in two folders gave two hashes. Cause: its record, path and SHA-256, was
+    /// taken for a path, which cannot be read.
+    #[test]
+    fn a_recorded_plugin_counts_by_its_recorded_hash_and_not_by_its_path() {
+        let asid = Method::named("asid").unwrap();
+        let of = |plugin: &str| {
+            let all = table(&format!("plugins = ['{plugin}']"));
+            hash(&canonical(&all, &asid)).0
+        };
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        let one = of(&format!("/a/lib.so#sha256={abc}"));
+        assert_eq!(one, of(&format!("/b/lib.so#sha256={}", abc.to_uppercase())));
+        assert_ne!(
+            one,
+            of(&format!("/a/lib.so#sha256={}", abc.replace('b', "c")))
+        );
+        // As the file itself counts.
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("lib.so");
+        std::fs::write(&file, "abc").unwrap();
+        assert_eq!(one, of(&file.display().to_string()));
     }
 
     /// The test vector `abc` of FIPS 180-2, appendix B.1.

@@ -106,7 +106,7 @@ pub fn of_config(path: Option<&Path>, named: &[PathBuf], trusted: bool) -> Resul
 }
 
 /// Separates a plugin's file from its hash in a configuration: `FILE#sha256=HEX`.
-const HASH: &str = "#sha256=";
+const HASH: &str = asid_comparison::settings::PLUGIN_HASH;
 
 /// A plugin as a configuration records it.
 struct Recorded {
