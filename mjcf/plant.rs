@@ -8,6 +8,7 @@ mod drive;
 mod jacobian;
 mod poses;
 mod reading;
+mod sensor;
 
 use asid_core::error::{Error, Result};
 use asid_core::layout::{JointKind, Layout};
@@ -70,7 +71,8 @@ pub struct PlantGeom {
 pub enum Reads {
     /// A joint, by index in [`Layout::joints`].
     Joint(usize),
-    /// A body's frame, by index in [`Layout::bodies`].
+    /// A body's frame, or that of its inertia where both coincide, by index in
+    /// [`Layout::bodies`].
     Body(usize),
     /// Something else.
     Other,

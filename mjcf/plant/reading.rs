@@ -4,7 +4,8 @@ use mjcf_rs::Model as Document;
 use mjcf_rs::body::{Joint, JointType};
 
 use super::drive::{Drive, law};
-use super::{Plant, PlantBody, PlantGeom, PlantJoint, Reads};
+use super::sensor::reads;
+use super::{Plant, PlantBody, PlantGeom, PlantJoint};
 use crate::document;
 use crate::mass::{GeomMass, MassProperties};
 use asid_core::error::Result;
@@ -76,16 +77,7 @@ impl Plant {
         let sensors = model
             .sensors
             .iter()
-            .map(|s| {
-                let name = s.objname.as_deref().unwrap_or_default();
-                let joint = layout.joints.iter().position(|j| j.name == name);
-                let body = layout.bodies.iter().position(|b| b == name);
-                match (s.kind.as_str(), joint, body) {
-                    (kind, Some(j), _) if kind.starts_with("joint") => Reads::Joint(j),
-                    (kind, _, Some(b)) if kind.starts_with("frame") => Reads::Body(b),
-                    _ => Reads::Other,
-                }
-            })
+            .map(|s| reads(&model, &layout, s))
             .collect();
         let contacts = contacts(&model, &layout, &bodies, &geoms);
         let poses = model
