@@ -4,9 +4,10 @@ mod paper;
 
 use std::fmt::Write as _;
 
+use crate::cell::CellKey;
 use crate::grid::{Entry, Grid};
 use crate::plan::Plan;
-use crate::rows::{ComparisonResult, Row, Summary};
+use crate::rows::{ComparisonResult, Omitted, Row, Summary};
 
 /// Explanation of the main table's columns.
 const MAIN: &str = "Lower is better. IQM: interquartile mean of the metric over seeds with its 95 % bootstrap interval; \
@@ -30,7 +31,7 @@ pub fn grids(plan: &Plan, result: &ComparisonResult) -> Vec<Grid> {
 
 /// Sentences that accompany every form of a result: what is missing, failed or shortened.
 #[must_use]
-pub fn notes(result: &ComparisonResult) -> Vec<String> {
+pub fn notes(plan: &Plan, result: &ComparisonResult) -> Vec<String> {
     let mut notes = Vec::new();
     if result.quick {
         notes.push("A quick look: searches were cut to half and seeds are few.".to_owned());
@@ -44,8 +45,8 @@ pub fn notes(result: &ComparisonResult) -> Vec<String> {
     for f in &result.failures {
         notes.push(format!("Failed: {}: {}", f.key.words(), f.reason));
     }
-    let gone = result.cells.planned - result.cells.done;
-    if gone > 0 && result.omitted.is_empty() && result.failures.is_empty() {
+    let gone = gone(plan, result);
+    if gone > 0 {
         notes.push(format!(
             "{gone} of {} runs are not there.",
             result.cells.planned
@@ -54,11 +55,27 @@ pub fn notes(result: &ComparisonResult) -> Vec<String> {
     notes
 }
 
+/// Number of planned runs that are neither done, nor failed, nor of a method that was left out.
+fn gone(plan: &Plan, result: &ComparisonResult) -> usize {
+    let left_out = |key: &CellKey| {
+        let of = |o: &Omitted| {
+            (&o.task, &o.method, &o.world, &o.backend)
+                == (&key.task, &key.method, &key.world, &key.backend)
+        };
+        result.omitted.iter().any(of)
+    };
+    let cells = plan.cells();
+    let planned = cells.iter().filter(|key| !left_out(key)).count();
+    let failures = result.failures.iter();
+    let failed = failures.filter(|f| !left_out(&f.key)).count();
+    planned.saturating_sub(result.cells.done + failed)
+}
+
 /// Formats the tables and notes as Markdown.
 #[must_use]
 pub fn markdown(plan: &Plan, result: &ComparisonResult) -> String {
     let mut text = String::new();
-    for note in notes(result) {
+    for note in notes(plan, result) {
         let _ = writeln!(text, "> {note}");
     }
     if !text.is_empty() {
@@ -301,6 +318,7 @@ fn methods(result: &ComparisonResult) -> Grid {
 mod tests {
     use super::*;
     use crate::cell::tests::{cell, key};
+    use crate::cell::{Cell, Failure};
     use crate::plan::tests::plan;
     use crate::plan::{PERTURBED, TaskPlan};
     use crate::rows::summarise;
@@ -337,6 +355,38 @@ mod tests {
         assert!(line.contains("100 % (61 to 100)"), "{line}");
         assert!(line.contains("1.00 (1.00 to 1.00) than dr"), "{line}");
         assert!(!head.contains("differs"));
+    }
+
+    /// Symptom: a merge without some shares said nothing of the runs that were not there. Cause: they
+    /// were counted only where nothing was left out and nothing had failed.
+    #[test]
+    fn missing_runs_are_told_beside_methods_left_out_and_failed_runs() {
+        let (plan, _) = example();
+        let keys = plan.cells();
+        let of = |method: &str| -> Vec<CellKey> {
+            let all = keys.iter().filter(|k| k.method == method);
+            all.cloned().collect()
+        };
+        let why = |key: &CellKey, of_all: bool| Failure {
+            key: key.clone(),
+            reason: "no policy".into(),
+            of_all,
+        };
+        // Of `asid` the first two runs are there; `dr` is left out in the first world.
+        let (asid, dr) = (of("asid"), of("dr"));
+        let done = asid[..2].iter().map(|k| cell(k.clone(), 1.0, true));
+        let done: Vec<Cell> = done.collect();
+        let failures = [why(&dr[0], true), why(&asid[2], false)];
+        let result = summarise(&plan, &done, &failures, &|_| None);
+        assert_eq!((result.omitted.len(), result.failures.len()), (1, 1));
+        let gone = keys.len() - plan.seeds as usize - 3;
+        let told = notes(&plan, &result);
+        let line = format!("{gone} of {} runs are not there.", keys.len());
+        assert!(told.contains(&line), "{told:?}");
+
+        // Nothing is missing.
+        let (plan, all) = example();
+        assert!(notes(&plan, &all).is_empty());
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub fn html(plan: &Plan, result: &ComparisonResult, runs: &[Run], repeat: &str) 
     if result.quick {
         page = page.badge("quick look", Tone::Fair);
     }
-    let notes = notes(result);
+    let notes = notes(plan, result);
     if !notes.is_empty() {
         let section = Section::new("What to know");
         page = page.section(notes.into_iter().fold(section, Section::note));
