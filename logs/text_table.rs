@@ -114,6 +114,11 @@ fn is_void(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with(COMMENT)
 }
 
+/// Whether the reader makes no record of a line; of spaces alone it makes one.
+fn is_passed_over(line: &str) -> bool {
+    line.trim_end_matches(['\r', '\n']).is_empty() || line.starts_with(COMMENT)
+}
+
 /// Refuses a header with a repeated name, which would be ambiguous.
 ///
 /// Empty names do not count, as pandas writes one for its index.
@@ -222,13 +227,13 @@ impl<'t> TextTable<'t> {
                     Ok(true) => {}
                     Err(e) => return Some(Err(one_line(&e.to_string()))),
                 }
-                let start = cells.position().map_or(0, |p| p.byte() as usize);
+                let start = cells.position().map_or(0, |p| p.byte() as usize).max(at);
                 number += newlines(&self.body[at..start]);
                 at = start;
                 // A record begins where the previous one ended: before blank lines and comments.
                 for line in self.body[start..]
                     .split_inclusive('\n')
-                    .take_while(|l| is_void(l))
+                    .take_while(|l| is_passed_over(l))
                 {
                     at += line.len();
                     number += 1;
@@ -306,6 +311,20 @@ mod tests {
             let (found, rows) = numbers(&text);
             assert_eq!(found, [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
             assert_eq!(rows, [4, 7, 8]);
+        }
+    }
+
+    /// Symptom: a panic at a line of spaces above a blank line or a comment.
+    ///
+    /// Cause: the line of spaces counted as not part of the table, but the reader makes a record of
+    /// it, and the next one then began before the place that was already counted.
+    #[test]
+    fn spaces_above_a_comment_are_passed_over() {
+        for end in ["\n", "\r\n"] {
+            let text = ["t,x", "0,1", " ", "# stop", "1,2", "  ", "", "2,3"].join(end);
+            let (found, rows) = numbers(&text);
+            assert_eq!(found, [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
+            assert_eq!(rows, [2, 5, 8]);
         }
     }
 
