@@ -15,6 +15,10 @@ use crate::record::Record;
 
 use super::Rival;
 
+/// Share of a variance below which what earlier values leave of it is rounding: a millionth of the
+/// deviation.
+const FLAT: f64 = 1e-12;
+
 /// Returns how far the predictions of an episode by two explanations differ after a fit to it, a
 /// sum of squares in units of the noise.
 ///
@@ -40,7 +44,7 @@ fn predicted(
     (trials, of): Rival<'_>,
     start: &[State],
 ) -> Result<(DVector<f64>, Vec<DVector<f64>>)> {
-    let steps = deviations(of);
+    let steps = deviations(of, bench.train.readings);
     let point = |theta: Vec<f64>| Point {
         theta,
         starts: start.to_vec(),
@@ -62,15 +66,11 @@ fn predicted(
 /// factor of their covariance, with the share moved.
 ///
 /// The share is smaller where a whole standard deviation would leave the ranges, and negative in
-/// the opposite direction.
-fn deviations(of: &Explanation) -> Vec<(Vec<f64>, f64)> {
+/// the opposite direction. `readings` is the number of readings that the values were fitted to.
+fn deviations(of: &Explanation, readings: usize) -> Vec<(Vec<f64>, f64)> {
     let fit = &of.fit;
-    let readings = fit.residuals.len().max(1) as f64;
-    let covariance = &fit.covariance * (fit.cost / readings).max(1.0);
-    let Some(root) = covariance.cholesky() else {
-        return Vec::new();
-    };
-    let root: DMatrix<f64> = root.l();
+    let left = (fit.cost / readings.max(1) as f64).max(1.0);
+    let root = factor(&(&fit.covariance * left));
     let moved = |column: usize, share: f64| {
         let mut theta = fit.point.theta.clone();
         for (k, &i) in fit.free.iter().enumerate() {
@@ -87,11 +87,35 @@ fn deviations(of: &Explanation) -> Vec<(Vec<f64>, f64)> {
     };
     let shares = [1.0, -1.0, 0.1, -0.1, 0.01, -0.01];
     (0..root.ncols())
+        .filter(|&column| root[(column, column)] != 0.0)
         .filter_map(|column| {
             let each = shares.iter().map(|&s| (moved(column, s), s));
             each.into_iter().find(|(theta, _)| is_within(theta))
         })
         .collect()
+}
+
+/// Returns the lower Cholesky factor of a covariance of any rank.
+///
+/// A column is zero where the earlier values determine its value, and where a value has no
+/// variance.
+fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = covariance.nrows();
+    let mut root = DMatrix::<f64>::zeros(n, n);
+    for j in 0..n {
+        let own = covariance[(j, j)];
+        let pivot = own - root.row(j).norm_squared();
+        if pivot <= FLAT * own {
+            continue;
+        }
+        let pivot = pivot.sqrt();
+        root[(j, j)] = pivot;
+        for i in j + 1..n {
+            let earlier: f64 = (0..j).map(|k| root[(i, k)] * root[(j, k)]).sum();
+            root[(i, j)] = (covariance[(i, j)] - earlier) / pivot;
+        }
+    }
+    root
 }
 
 /// `d^T (I + K K^T)^-1 d`, by the matrix inversion lemma.
@@ -111,7 +135,73 @@ fn beyond(difference: &DVector<f64>, columns: &[DVector<f64>]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use asid_core::Parameter;
+    use asid_core::parameter::Scale;
+
     use super::*;
+    use crate::fit::{Fit, StartSlopes};
+    use crate::linearise::Unknown;
+
+    /// An explanation with values at 0 and ranges from -9 to 9, whose fit leaves a sum of squares.
+    fn explanation(covariance: DMatrix<f64>, cost: f64) -> Explanation {
+        let n = covariance.nrows();
+        let unknown = |i: usize| {
+            Unknown::free(Parameter {
+                name: format!("value {i}"),
+                targets: Vec::new(),
+                range: [-9.0, 9.0],
+                scale: Scale::Linear,
+                unit: String::new(),
+            })
+        };
+        Explanation {
+            effects: Vec::new(),
+            is_tolerance: Vec::new(),
+            unknowns: (0..n).map(unknown).collect(),
+            fit: Fit {
+                point: Point {
+                    theta: vec![0.0; n],
+                    starts: Vec::new(),
+                },
+                cost,
+                residuals: vec![0.0; 100],
+                shows: vec![1.0; n],
+                gains: DMatrix::zeros(n, 100),
+                covariance,
+                free: (0..n).collect(),
+                starts: Arc::new(StartSlopes::default()),
+            },
+            held_out: 0.0,
+            held_starts: Vec::new(),
+            local: vec![None; n],
+        }
+    }
+
+    /// Symptom: with a value that no reading shows, such as an axis that a sensor does not have,
+    /// no value was fitted again. Cause: a covariance with a zero row has no Cholesky
+    /// decomposition.
+    #[test]
+    fn values_beside_one_that_does_not_show_are_fitted_again() {
+        let c = DMatrix::from_row_slice(3, 3, &[4.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 1.25]);
+        let steps = deviations(&explanation(c, 10.0), 10);
+        let expected = [(vec![2.0, 0.0, 1.0], 1.0), (vec![0.0, 0.0, 0.5], 1.0)];
+        assert_eq!(steps, expected);
+        // Two values of which the logs show only the sum.
+        let c = DMatrix::from_element(2, 2, 4.0);
+        let steps = deviations(&explanation(c, 10.0), 10);
+        assert_eq!(steps, [(vec![2.0, 2.0], 1.0)]);
+    }
+
+    /// Symptom: a fit to logs with gaps looked better than it is. Cause: its sum of squares was
+    /// divided by the number of rows, with those that lack the reading.
+    #[test]
+    fn a_misfit_is_per_reading_that_is_there() {
+        let one = || explanation(DMatrix::from_element(1, 1, 1.0), 40.0);
+        assert_eq!(deviations(&one(), 10), [(vec![2.0], 1.0)]);
+        assert_eq!(deviations(&one(), 40), [(vec![1.0], 1.0)]);
+    }
 
     #[test]
     fn what_a_value_can_take_away_tells_nothing() {
