@@ -210,6 +210,25 @@ fn several_effects_compose() {
     assert!(without > 0.05);
 }
 
+/// Symptom: the exported document of an elastic or loose joint with a spring moved otherwise than
+/// the refined model.
+///
+/// Cause: the spring stayed at the drive's side of the transmission, while it acts on the link.
+#[test]
+fn the_spring_of_an_elastic_joint_acts_on_its_link() {
+    let own = r#"name="elbow" axis="0 1 0" stiffness="6" springref="40""#;
+    let xml = ARM.replace(r#"name="elbow" axis="0 1 0""#, own);
+    let effect = "joint-compliance@elbow:compliance=0.05";
+    let model = refined(&xml, &[], &[effect]);
+    let ([left, _], [without, _]) = distances(&model, &[]);
+    assert!(left < 0.02 * without, "{left} of {without}");
+    let written = exported(&model).xml;
+    assert!(
+        written.contains(r#"_whole" damping="0.05" stiffness="6""#),
+        "{written}"
+    );
+}
+
 /// Symptom: the exported document moved otherwise than the refined model where a servo had a
 /// `dampratio`.
 ///

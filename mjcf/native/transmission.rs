@@ -3,8 +3,8 @@
 //! The joint that the drive acts on keeps its name and becomes the rotor's. A second joint follows,
 //! in the same body and about the same axis: the link's against the rotor. It is free within a
 //! `range` as wide as the gap, or held by a spring with its damper. Properties of the sum of the
-//! two (damping, dry friction, the joint's own range, its sensors) move to a fixed tendon over
-//! both.
+//! two (damping, dry friction, the joint's own spring and range, its sensors) move to a fixed tendon
+//! over both.
 
 use asid_core::Target;
 use asid_core::error::Result;
@@ -65,6 +65,7 @@ impl Writer<'_, '_> {
                 "joint `{name}` has no rotor inertia: {inertia:.3e} is written in its place, which lags the servo by a step"
             ));
         }
+        let spring = self.move_spring(i, &name)?;
         self.markup.set(node, "damping", "0");
         self.markup.set(node, "frictionloss", "0");
         self.markup.set_numbers(node, "armature", &[inertia]);
@@ -89,7 +90,7 @@ impl Writer<'_, '_> {
             let half = series.gap / 2.0 * unit;
             let time = END_TIME * timestep;
             format!(
-                "limited=\"true\" range=\"{}\" solreflimit=\"{time} 1\" stiffness=\"0\" damping=\"0\"",
+                "limited=\"true\" range=\"{}\" solreflimit=\"{time} 1\" stiffness=\"0\" springref=\"0\" damping=\"0\"",
                 numbers(&[-half, half])
             )
         };
@@ -115,9 +116,36 @@ impl Writer<'_, '_> {
             String::new()
         };
         Ok(format!(
-            "    <fixed name=\"{written}_whole\" damping=\"{damping}\"{friction}{limits}>\
+            "    <fixed name=\"{written}_whole\" damping=\"{damping}\"{spring}{friction}{limits}>\
              <joint joint=\"{written}\" coef=\"1\"/><joint joint=\"{written}_link\" coef=\"1\"/></fixed>\n"
         ))
+    }
+
+    /// Moves the spring of the joint to the tendon, so that it acts on the link; returns the tendon's
+    /// attribute.
+    ///
+    /// MuJoCo rests the spring of a tendon where the springs of its joints rest, so the joint keeps
+    /// its `springref`.
+    fn move_spring(&mut self, i: usize, name: &str) -> Result<String> {
+        let node = self.elements.joints[i];
+        let damped = "springdamper";
+        let is_damped = node.has_attribute(damped) || self.elements.default_has("joint", damped);
+        let written = self.markup.get(node, "stiffness");
+        // A `springdamper` overrides the stiffness that stands beside it.
+        let is_overridden = is_damped && written.as_deref() == node.attribute("stiffness");
+        let stiffness = match written.filter(|_| !is_overridden) {
+            Some(text) => text,
+            None => numbers(&[self.value(&Target::new("joint", name, "stiffness", 0))?]),
+        };
+        if is_damped {
+            self.markup.set(node, damped, "0 0");
+        }
+        let mut coefficients = stiffness.split_whitespace();
+        if coefficients.all(|x| x.parse::<f64>().is_ok_and(|x| x == 0.0)) {
+            return Ok(String::new());
+        }
+        self.markup.set(node, "stiffness", "0");
+        Ok(format!(" stiffness=\"{stiffness}\""))
     }
 
     /// Moves the range of the joint to the tendon; returns the tendon's attributes.
