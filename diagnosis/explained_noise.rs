@@ -169,6 +169,7 @@ mod tests {
             shows: vec![1.0],
             covariance: &gains * gains.transpose(),
             gains,
+            unresolved: vec![false],
             free: vec![0],
             starts: Arc::new(StartSlopes::default()),
         };

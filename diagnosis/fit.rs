@@ -14,11 +14,15 @@ use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
 use crate::linearise::{Differences, Linearisation, Open, Unknown, slope};
-use crate::normal::{Normal, inverse};
+use crate::normal::{Normal, inverse, left_out};
 use crate::predict::{Point, Predictor};
 
 pub use region::Region;
 use steps::Steps;
+
+/// Information of a combination of parameters, relative to that of each of them, up to which it is
+/// rounding: some tens of the last digits.
+const UNRESOLVED: f64 = 1e-14;
 
 /// How long and how finely a fit searches.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +73,11 @@ pub struct Fit {
     /// `free x residuals`, in the parameter's unit.
     pub gains: DMatrix<f64>,
     /// Covariance of the free parameters for residuals of unit variance, in the parameters' units.
+    ///
+    /// A combination that the residuals do not show has no variance here.
     pub covariance: DMatrix<f64>,
+    /// Whether each free parameter has a part in such a combination.
+    pub unresolved: Vec<bool>,
     /// Indices of the free parameters.
     pub free: Vec<usize>,
     /// Derivatives with respect to the initial states at the last linearisation.
@@ -228,7 +236,7 @@ fn finish(work: Steps<'_, '_>, point: Point, line: Linearisation) -> Fit {
     let (unknowns, free) = (work.unknowns, work.free);
     let normal = Normal::new(&line, &work.bounds, 0.0, work.reach);
     let p = free.len();
-    let inverse = inverse(&normal.information, 1e-14);
+    let inverse = inverse(&normal.information, UNRESOLVED);
     // Converts shares of the range to the parameter's unit.
     let scale: Vec<f64> = free
         .iter()
@@ -247,6 +255,7 @@ fn finish(work: Steps<'_, '_>, point: Point, line: Linearisation) -> Fit {
         residuals: line.residuals,
         point,
         covariance,
+        unresolved: left_out(&normal.information, UNRESOLVED),
         free,
         starts: Arc::new(StartSlopes {
             steps: work.differences.starts,

@@ -1,7 +1,7 @@
 //! Normal equations of a fit, in arrow form: the initial state of an episode acts on that episode
 //! alone, and is eliminated there (Schur complement).
 
-use nalgebra::linalg::SVD;
+use nalgebra::linalg::{SVD, SymmetricEigen};
 use nalgebra::{DMatrix, DVector};
 
 use crate::linearise::Linearisation;
@@ -19,6 +19,9 @@ pub(crate) struct Normal {
 /// Maximum number of QR iterations of a singular value decomposition per row: it needs two or
 /// three, and never ends if an entry is not finite.
 const ITERATIONS: usize = 100;
+/// Squared component of a unit vector from which on a value has a part in a direction: rounding
+/// leaves less.
+const PART: f64 = 1e-6;
 
 /// Returns the pseudo-inverse of a symmetric matrix, scaled to a unit diagonal first.
 ///
@@ -41,6 +44,36 @@ pub(crate) fn inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
         .and_then(|parts| parts.pseudo_inverse(tolerance).ok())
         .unwrap_or_else(|| DMatrix::zeros(n, n));
     DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale(i) * scale(j))
+}
+
+/// Returns which values have a part in the directions that [`inverse`] leaves out, as two values
+/// have that only show together.
+///
+/// A value that does not show at all has no part in them. None has if an entry is not finite.
+#[must_use]
+pub(crate) fn left_out(matrix: &DMatrix<f64>, tolerance: f64) -> Vec<bool> {
+    let mut shares = vec![0.0; matrix.nrows()];
+    let shown: Vec<usize> = (0..shares.len())
+        .filter(|&i| matrix[(i, i)] != 0.0)
+        .collect();
+    let n = shown.len();
+    let scale = |i: usize| 1.0 / matrix[(i, i)].abs().sqrt().max(1e-150);
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        let (i, j) = (shown[i], shown[j]);
+        matrix[(i, j)] * scale(i) * scale(j)
+    });
+    let is_finite = n > 0 && scaled.iter().all(|x| x.is_finite());
+    let parts = is_finite
+        .then(|| SymmetricEigen::try_new(scaled, 5.0 * f64::EPSILON, ITERATIONS * n))
+        .flatten();
+    if let Some(parts) = parts {
+        for k in (0..n).filter(|&k| parts.eigenvalues[k] <= tolerance) {
+            for (row, &i) in shown.iter().enumerate() {
+                shares[i] += parts.eigenvectors[(row, k)].powi(2);
+            }
+        }
+    }
+    shares.iter().map(|share| *share > PART).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -169,6 +202,19 @@ mod tests {
         let matrix = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 0.0]);
         let expected = DMatrix::from_row_slice(2, 2, &[0.25, 0.0, 0.0, 0.0]);
         assert!((inverse(&matrix, 1e-12) - expected).amax() < 1e-15);
+    }
+
+    /// Two values with opposite columns, one that shows by itself and one that does not show.
+    #[test]
+    fn values_that_only_show_together_are_left_out() {
+        let columns = DMatrix::from_row_slice(2, 4, &[3.0, -6.0, 0.0, 0.0, 0.0, 0.0, 1e-3, 0.0]);
+        let matrix = columns.tr_mul(&columns);
+        assert_eq!(left_out(&matrix, 1e-14), [true, true, false, false]);
+        let apart = DMatrix::from_row_slice(2, 2, &[9.0, -17.9, -17.9, 36.0]);
+        assert_eq!(left_out(&apart, 1e-14), [false, false]);
+        let none = DMatrix::from_element(2, 2, f64::NAN);
+        assert_eq!(left_out(&none, 1e-14), [false, false]);
+        assert!(left_out(&DMatrix::zeros(0, 0), 1e-14).is_empty());
     }
 
     /// Symptom, for the spin of a ball about the normal of its floor: a step of ten thousand rad/s,

@@ -34,6 +34,8 @@ pub fn identifiability(
         slope(&parameters[i], fit.point.theta[i]).abs()
     };
     let deviation = |k: usize| fit.covariance[(k, k)].max(0.0).sqrt() / scale(fit, k);
+    // The covariance says nothing of combinations that the logs do not show at all.
+    let is_loose = |k: usize| fit.unresolved[k] || deviation(k) > PINNED;
     // Far from the logs a replay may be so chaotic that it has no useful derivative. The best
     // explanation is closer.
     let information = |k: usize| {
@@ -61,7 +63,7 @@ pub fn identifiability(
         )
     };
     let loose: Vec<String> = (0..p)
-        .filter(|&k| information(k) * PINNED >= 1.0 && deviation(k) > PINNED)
+        .filter(|&k| information(k) * PINNED >= 1.0 && is_loose(k))
         .map(|k| parameters[fit.free[k]].name.clone())
         .collect();
     let together = if loose.is_empty() {
@@ -103,4 +105,93 @@ fn correlated(parameters: &[Parameter], none: &Explanation) -> Option<String> {
     }
     let name = |k: usize| &parameters[none.fit.free[k]].name;
     worst.map(|(r, i, j)| format!("{} and {} trade off: correlation {r:.3}", name(i), name(j)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use asid_core::parameter::Scale;
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::fit::StartSlopes;
+    use crate::linearise::Unknown;
+    use crate::normal::{inverse, left_out};
+    use crate::predict::Point;
+
+    fn parameter(name: &str) -> Parameter {
+        Parameter {
+            name: name.to_owned(),
+            targets: Vec::new(),
+            range: [0.0, 1.0],
+            scale: Scale::Linear,
+            unit: String::new(),
+        }
+    }
+
+    /// An explanation without effects, fitted to logs with some information on parameters whose
+    /// ranges are of length 1.
+    fn explanation(parameters: &[Parameter], information: &DMatrix<f64>) -> Explanation {
+        let n = parameters.len();
+        Explanation {
+            effects: Vec::new(),
+            is_tolerance: Vec::new(),
+            unknowns: parameters.iter().cloned().map(Unknown::free).collect(),
+            fit: Fit {
+                point: Point {
+                    theta: vec![0.5; n],
+                    starts: Vec::new(),
+                },
+                cost: 0.0,
+                residuals: Vec::new(),
+                shows: (0..n).map(|k| information[(k, k)].sqrt()).collect(),
+                gains: DMatrix::zeros(n, 0),
+                covariance: inverse(information, 1e-14),
+                unresolved: left_out(information, 1e-14),
+                free: (0..n).collect(),
+                starts: Arc::new(StartSlopes::default()),
+            },
+            held_out: 0.0,
+            held_starts: Vec::new(),
+            local: vec![None; n],
+        }
+    }
+
+    /// Symptom: of a cart with `m a = g u`, the logs were said to determine every combination of
+    /// the mass `m` and the gain `g`. Cause: the pseudo-inverse gives a combination that does not
+    /// show no variance, which is as if it were known.
+    #[test]
+    fn a_mass_and_a_gain_that_only_show_as_their_ratio_are_told() {
+        let parameters = ["mass", "gain", "damping"].map(parameter);
+        let told = |information: &DMatrix<f64>| {
+            let none = explanation(&parameters, information);
+            let all = identifiability(&parameters, &none, &none);
+            let found = all
+                .into_iter()
+                .find(|c| c.check == "identifiability")
+                .unwrap();
+            (found.ok, found.detail)
+        };
+        let of = |coupling: f64| {
+            let rows = [
+                [400.0, coupling, 0.0],
+                [coupling, 400.0, 0.0],
+                [0.0, 0.0, 400.0],
+            ];
+            DMatrix::from_row_slice(3, 3, &rows.concat())
+        };
+        let (ok, detail) = told(&of(-400.0));
+        assert!(
+            !ok && detail.contains("mass, gain only in combination"),
+            "{detail}"
+        );
+        let (ok, detail) = told(&of(-399.0));
+        assert!(
+            !ok && detail.contains("mass, gain only in combination"),
+            "{detail}"
+        );
+        let (ok, detail) = told(&of(-100.0));
+        assert!(ok, "{detail}");
+    }
 }

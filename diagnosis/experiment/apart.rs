@@ -170,6 +170,7 @@ mod tests {
                 shows: vec![1.0; n],
                 gains: DMatrix::zeros(n, 100),
                 covariance,
+                unresolved: vec![false; n],
                 free: (0..n).collect(),
                 starts: Arc::new(StartSlopes::default()),
             },
