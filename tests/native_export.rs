@@ -210,6 +210,28 @@ fn several_effects_compose() {
     assert!(without > 0.05);
 }
 
+/// Symptom: an exported servo with a `timeconst` answered without its lag.
+///
+/// Cause: a gain or a bias of its command is written in the long form, with `dyntype="none"`.
+#[test]
+fn a_servo_with_a_gain_keeps_its_own_lag() {
+    let own = ARM.replace(r#"kv="0.4""#, r#"kv="0.4" timeconst="0.05""#);
+    let class = ARM.replace(r#"kp="8""#, r#"class="link" kp="8""#).replace(
+        r#"size="0.02"/>"#,
+        r#"size="0.02"/><position timeconst="0.05"/>"#,
+    );
+    for xml in [own, class] {
+        let model = refined(&xml, &[], &["actuator-gain@hold:gain=0.8"]);
+        let ([_, left], [_, without]) = distances(&model, &[]);
+        assert!(left < EXACT, "{left} of {without}");
+        assert!(without > 1e-3, "{without}");
+        let model = refined(&xml, &[], &["actuator-lag@hold:time_constant=0.1"]);
+        let written = exported(&model);
+        let sentences = written.sentences().join("\n");
+        assert!(sentences.contains("has a filter of its own"), "{sentences}");
+    }
+}
+
 /// Symptom: the exported document of an elastic or loose joint with a spring moved otherwise than
 /// the refined model.
 ///

@@ -11,6 +11,7 @@ use roxmltree::Node;
 
 use super::elements::HISTORY_MARGIN;
 use super::{NativeActuator, Writer};
+use crate::markup::numbers;
 use crate::plant::DriveLaw;
 
 /// Attributes of short forms that `<general>` does not have.
@@ -39,7 +40,7 @@ impl Writer<'_, '_> {
     }
 
     fn write_gains(&mut self, i: usize, name: &str, node: Node<'_, '_>) -> Result<()> {
-        let asked = self.native.actuators.get(&i).cloned().unwrap_or_default();
+        let mut asked = self.native.actuators.get(&i).cloned().unwrap_or_default();
         let drive = self.native.plant.drives[i];
         let kp = self.entries("actuator", name, "kp", 1)?.map(|v| v[0]);
         let mut kv = self.entries("actuator", name, "kv", 1)?.map(|v| v[0]);
@@ -64,6 +65,12 @@ impl Writer<'_, '_> {
             }
             return Ok(());
         };
+        if asked.lag > 0.0 && self.filter(node).is_some() {
+            self.leave_out(format!(
+                "actuator `{name}` has a filter of its own, and MJCF has one per actuator: its added lag is not written"
+            ));
+            asked.lag = 0.0;
+        }
         let gear = self.value(&Target::new("actuator", name, "gear", 0))?;
         let declared = self
             .model
@@ -152,6 +159,7 @@ impl Writer<'_, '_> {
         slopes: Option<[f64; 2]>,
         asked: &NativeActuator,
     ) {
+        let filter = self.filter(node);
         for attribute in SHORT {
             self.markup.remove(node, attribute);
         }
@@ -166,12 +174,35 @@ impl Writer<'_, '_> {
         if asked.lag > 0.0 {
             self.markup.set(node, "dyntype", "filterexact");
             self.markup.set_numbers(node, "dynprm", &[asked.lag]);
+        } else if let Some((kind, numbers)) = filter {
+            self.markup.set(node, "dyntype", kind);
+            if let Some(numbers) = numbers {
+                self.markup.set(node, "dynprm", numbers);
+            }
         } else {
             self.markup.set(node, "dyntype", "none");
         }
         if let Some(range) = self.native.plant.layout.actuators[i].ctrl_range {
             self.markup.set_numbers(node, "ctrlrange", &range);
         }
+    }
+
+    /// The filter that the document gives an actuator: its `dyntype`, and `dynprm` where it is said.
+    fn filter(&self, node: Node<'_, '_>) -> Option<(String, Option<String>)> {
+        // The other short forms have none.
+        if !matches!(node.tag_name().name(), "position" | "general") {
+            return None;
+        }
+        let kind = self.elements.said(node, |n| match lag(n) {
+            Some(lag) => Some(if lag > 0.0 { "filterexact" } else { "none" }.to_owned()),
+            None => n.attribute("dyntype").map(str::to_owned),
+        });
+        let kind = kind.filter(|kind| kind != "none")?;
+        let numbers = self.elements.said(node, |n| match lag(n) {
+            Some(lag) if lag > 0.0 => Some(numbers(&[lag])),
+            _ => n.attribute("dynprm").map(str::to_owned),
+        });
+        Some((kind, numbers))
     }
 
     fn write_delay(&mut self, node: Node<'_, '_>, delay: f64) {
@@ -188,6 +219,11 @@ impl Writer<'_, '_> {
         self.markup.set_numbers(node, "forcerange", &range);
         self.markup.set(node, "forcelimited", "true");
     }
+}
+
+/// Time constant of the lag of a servo in its short form, s; `None` where it says none.
+fn lag(node: Node<'_, '_>) -> Option<f64> {
+    node.attribute("timeconst")?.trim().parse().ok()
 }
 
 /// Whether an actuator, or a class's, takes its damping from a ratio; `None` if it does not say.
