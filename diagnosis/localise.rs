@@ -53,6 +53,7 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
     cells.sort_by(|a, b| b.2.total_cmp(&a.2));
     let total: f64 = cells.iter().map(|c| c.2).sum();
     let features = Features::of(logs);
+    let present = logs.present();
     let mut conditions: Vec<Option<Option<String>>> = vec![None; n];
     cells
         .into_iter()
@@ -61,7 +62,7 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
             regime,
             share: excess / total,
             condition: conditions[j]
-                .get_or_insert_with(|| features.condition(&growth(logs, residuals, j)))
+                .get_or_insert_with(|| features.condition(&growth(logs, (residuals, &present), j)))
                 .clone(),
         })
         .collect()

@@ -15,15 +15,31 @@ const MOST: f64 = 0.8;
 /// Returns the squared growth of an entry's residual over the [`WINDOW`] rows that end at each row,
 /// beyond that of noise alone.
 ///
-/// It is NaN where a reading is missing. There is one value per row from [`WINDOW`] on, episode by
-/// episode.
-pub(super) fn growth(logs: &Logs, residuals: &[f64], entry: usize) -> Vec<f64> {
+/// It is NaN where a reading is missing. If the reading at the beginning of these rows is missing,
+/// the nearest row with a reading takes its place. There is one value per row from [`WINDOW`] on,
+/// episode by episode. `present` tells which residuals have a reading.
+pub(super) fn growth(
+    logs: &Logs,
+    (residuals, present): (&[f64], &[bool]),
+    entry: usize,
+) -> Vec<f64> {
     let n = logs.entries.len();
     let mut growth = Vec::new();
     for (e, log) in logs.episodes.iter().enumerate() {
-        let at = |k: usize| residuals[logs.offset(e) + k * n + entry];
-        growth.extend((WINDOW..log.plan.rows()).map(|k| {
-            let d = at(k) - at(k - WINDOW);
+        let rows = log.plan.rows();
+        let first = logs.offset(e) + entry;
+        let place = |k: usize| first + k * n;
+        let there: Vec<usize> = (0..rows).filter(|&k| present[place(k)]).collect();
+        let before = |k: usize| {
+            let aim = k - WINDOW;
+            let next = there.partition_point(|&row| row < aim);
+            let beside = &there[next.saturating_sub(1)..(next + 1).min(there.len())];
+            let earlier = beside.iter().filter(|&&row| row < k);
+            earlier.min_by_key(|row| row.abs_diff(aim)).copied()
+        };
+        growth.extend((WINDOW..rows).map(|k| {
+            let from = before(k).filter(|_| present[place(k)]);
+            let d = from.map_or(f64::NAN, |row| residuals[place(k)] - residuals[place(row)]);
             // The noise of a difference has a variance of two.
             if d.is_finite() {
                 (d * d - 2.0).max(0.0)
@@ -127,4 +143,30 @@ fn sorted(values: &[f64]) -> Vec<usize> {
         .collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::tests::{log, plant};
+
+    /// Symptom: a residual seemed to grow where readings are missing and where they begin again.
+    /// Cause: the residual of a missing reading, 0, was used as that of a reading.
+    #[test]
+    fn a_residual_grows_from_one_reading_to_another() {
+        let episode = log("a", &[0.0; 12]);
+        let logs = Logs::new(&plant(), &["place".to_owned()], vec![episode]).unwrap();
+        // The residual is the number of the row, and rows 5 and 6 have no reading.
+        let present: Vec<bool> = (0..12).map(|k| k != 5 && k != 6).collect();
+        let residual = |k: usize| if present[k] { k as f64 } else { 0.0 };
+        let residuals: Vec<f64> = (0..12).map(residual).collect();
+        let found = growth(&logs, (&residuals, &present), 0);
+        let found: Vec<Option<f64>> = (found.into_iter())
+            .map(|g| g.is_finite().then_some(g))
+            .collect();
+        // Over five rows, but over six from row 4 to row 10, and over four from row 7 to row 11.
+        let over = |rows: f64| Some(rows * rows - 2.0);
+        let [four, five, six] = [4.0, 5.0, 6.0].map(over);
+        assert_eq!(found, [None, None, five, five, five, six, four]);
+    }
 }

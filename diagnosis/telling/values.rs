@@ -23,8 +23,9 @@ use std::collections::BTreeMap;
 use asid_core::Result;
 
 use super::Telling;
-use crate::bench::{Bench, Explanation};
+use crate::bench::Explanation;
 use crate::checks::{RICHARDSON, change_by_step};
+use crate::data::Logs;
 use crate::linearise::NOTHING;
 use crate::result::ParameterResult;
 
@@ -38,15 +39,21 @@ const AT_END: f64 = 1e-6;
 
 /// Returns the correlation of neighbouring residuals, averaged over entries and episodes with their
 /// squares as weights.
-fn correlation(bench: &Bench, residuals: &[f64]) -> f64 {
-    let logs = &bench.train.logs;
+///
+/// The neighbour of a reading is the one before it of the same entry; between them readings may be
+/// missing. `present` tells which residuals have a reading.
+fn correlation(logs: &Logs, (residuals, present): (&[f64], &[bool])) -> f64 {
     let n = logs.entries.len();
     let (mut product, mut square) = (0.0, 0.0);
     for e in 0..logs.episodes.len() {
-        let part = &residuals[logs.offset(e)..logs.offset(e + 1)];
-        for k in n..part.len() {
-            product += part[k] * part[k - n];
-            square += part[k] * part[k];
+        let mut before: Vec<Option<f64>> = vec![None; n];
+        let rows = logs.offset(e)..logs.offset(e + 1);
+        for (k, i) in rows.enumerate().filter(|(_, i)| present[*i]) {
+            let residual = residuals[i];
+            if let Some(earlier) = before[k % n].replace(residual) {
+                product += residual * earlier;
+                square += residual * residual;
+            }
         }
     }
     if square > 0.0 {
@@ -99,7 +106,8 @@ impl Telling<'_> {
     /// noise's size.
     pub(super) fn inflation(&self, of: &Explanation) -> f64 {
         let readings = self.bench.train.readings.max(1) as f64;
-        let rho = correlation(self.bench, &of.fit.residuals);
+        let logs = &self.bench.train.logs;
+        let rho = correlation(logs, (&of.fit.residuals, &logs.present()));
         (of.fit.cost / readings).max(1.0) * (1.0 + rho) / (1.0 - rho)
     }
 
@@ -231,6 +239,19 @@ impl Telling<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::tests::{log, plant};
+
+    /// Symptom: the intervals of values were too narrow for a sensor that reads at every second
+    /// row. Cause: the residual of a missing reading, 0, was used as that of a reading.
+    #[test]
+    fn readings_are_correlated_over_rows_without_a_reading() {
+        let episode = log("a", &[0.0; 6]);
+        let logs = Logs::new(&plant(), &["place".to_owned()], vec![episode]).unwrap();
+        let alternate: Vec<bool> = (0..6).map(|k| k % 2 == 0).collect();
+        let of = |residuals: [f64; 6]| correlation(&logs, (&residuals, &alternate));
+        assert_eq!(of([1.0, 0.0, 2.0, 0.0, 2.0, 0.0]), 0.75);
+        assert_eq!(of([1.0, 0.0, 0.0, 0.0, 2.0, 0.0]), 0.0);
+    }
 
     #[test]
     fn a_mean_has_the_variance_of_its_sample_over_the_number_of_episodes() {
