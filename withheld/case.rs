@@ -24,6 +24,7 @@ use crate::regime::{Watch, places};
 use crate::seal::hex;
 use crate::simulate::watched;
 use rules::LeftOut;
+use sizing::Background;
 
 /// Number of training logs.
 const TRAIN: usize = 6;
@@ -147,8 +148,12 @@ impl Draw<'_> {
         } else {
             Vec::new()
         };
-        let dirt_gap = self.gap_of(&bench, &dirt)?;
-        let (causes, target) = self.sized_causes(&bench, dirt_gap, left_out)?;
+        let mut dirt = Background {
+            gap: self.gap_of(&bench, &dirt)?,
+            items: dirt,
+        };
+        let (causes, target) = self.sized_causes(&bench, &mut dirt, left_out)?;
+        let (dirt, dirt_gap) = (dirt.items, dirt.gap);
         // If the case is to have little motion or many or fast rows, its logs have motions of their
         // own.
         let style = self.style();

@@ -291,6 +291,12 @@ pub fn geared_joints(machine: &Anatomy) -> Vec<String> {
         .collect()
 }
 
+/// Whether a cause is a transmission between drive and joint. A joint can have only one.
+#[must_use]
+pub fn is_transmission(cause: &dyn Cause) -> bool {
+    matches!(cause.name(), "backlash" | "joint-compliance")
+}
+
 /// Names of all actuators.
 #[must_use]
 pub fn drives(machine: &Anatomy) -> Vec<String> {

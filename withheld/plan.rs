@@ -16,7 +16,7 @@ use rand::seq::{IndexedRandom, SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use crate::anatomy::Anatomy;
-use crate::cause::{Cause, Standing};
+use crate::cause::{Cause, Standing, is_transmission};
 use crate::causes;
 use crate::error::{Error, Result};
 use crate::faults::{LogFault, WiringKind};
@@ -309,11 +309,9 @@ impl Slot {
             .copied()
             .collect();
         others.shuffle(random);
-        // A joint can have only one transmission, so these two exclude each other.
-        let between = ["backlash", "joint-compliance"];
         for cause in others {
-            let clash = between.contains(&cause.name())
-                && self.causes.iter().any(|c| between.contains(&c.name()));
+            // Two transmissions exclude each other.
+            let clash = is_transmission(cause) && self.causes.iter().copied().any(is_transmission);
             if self.causes.len() < count && !clash {
                 self.causes.push(cause);
             }

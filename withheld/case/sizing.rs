@@ -7,7 +7,7 @@ use rand::seq::IndexedRandom;
 
 use super::Draw;
 use super::rules::LeftOut;
-use crate::cause::{Place, Standing};
+use crate::cause::{Place, Standing, is_transmission};
 use crate::dirt::{self, Item};
 use crate::error::Result;
 use crate::gap::Bench;
@@ -32,6 +32,25 @@ pub(super) struct Causes {
     pub(super) own: BTreeMap<String, f64>,
 }
 
+/// The dirt of a case, and its excess gap.
+pub(super) struct Background {
+    pub(super) items: Vec<Item>,
+    pub(super) gap: f64,
+}
+
+impl Background {
+    /// Drops transmissions of joints whose transmission is a cause; returns whether there were any.
+    fn drop_clashing(&mut self, causes: &[Item]) -> bool {
+        let before = self.items.len();
+        let takes = |cause: &Item, site: &str| is_transmission(cause.cause) && cause.site == site;
+        self.items.retain(|item| {
+            let clashes = || causes.iter().any(|cause| takes(cause, &item.site));
+            !(is_transmission(item.cause) && clashes())
+        });
+        self.items.len() < before
+    }
+}
+
 impl Draw<'_> {
     /// Draws other causes of the same kind.
     pub(super) fn other_causes(&mut self) {
@@ -44,10 +63,21 @@ impl Draw<'_> {
             .filter(|c| !group || c.sites(self.anatomy).len() > 1)
             .collect();
         self.slot.same_joint = false;
-        self.slot.causes = usable
+        let mut causes: Vec<_> = usable
             .choose_multiple(&mut self.random, count)
             .copied()
             .collect();
+        if causes.len() > 1 && causes.iter().copied().all(is_transmission) {
+            // Two transmissions exclude each other, as in the plan.
+            causes.pop();
+            let others: Vec<_> = usable
+                .iter()
+                .copied()
+                .filter(|&c| !is_transmission(c))
+                .collect();
+            causes.extend(others.choose(&mut self.random).copied());
+        }
+        self.slot.causes = causes;
     }
 
     /// Returns a world with the given items.
@@ -69,11 +99,12 @@ impl Draw<'_> {
 
     /// Finds causes of the planned size.
     ///
-    /// If that fails, it tries another site, then a smaller size, then other causes.
+    /// If that fails, it tries another site, then a smaller size, then other causes. Dirt that
+    /// clashes with a cause is dropped.
     pub(super) fn sized_causes(
         &mut self,
         bench: &Bench<'_>,
-        dirt_gap: f64,
+        dirt: &mut Background,
         left_out: &mut Vec<String>,
     ) -> Result<(Causes, f64), LeftOut> {
         let mut last = String::new();
@@ -86,19 +117,34 @@ impl Draw<'_> {
                     self.other_causes();
                 }
             }
-            let aim = self.slot.aim(self.lower);
-            let target = if self.slot.dirty {
-                aim * dirt_gap.max(LEAST_DIRT)
-            } else {
-                aim
-            };
-            match self.size(bench, target) {
+            let before = self.random.clone();
+            let mut target = self.target(dirt.gap);
+            let mut sized = self.size(bench, target);
+            let clash = |causes: &Causes| dirt.drop_clashing(&causes.items);
+            if sized.as_ref().is_ok_and(clash) {
+                // The same sites and draws again, sized by the dirt that is left.
+                dirt.gap = self.gap_of(bench, &dirt.items)?;
+                self.random = before;
+                target = self.target(dirt.gap);
+                sized = self.size(bench, target);
+            }
+            match sized {
                 Err(LeftOut::Rule(reason)) => last = reason,
                 other => return other.map(|causes| (causes, target)),
             }
             left_out.push(last.clone());
         }
         Err(LeftOut::Rule(last))
+    }
+
+    /// Gap for which the causes are sized beside dirt of this gap.
+    fn target(&self, dirt_gap: f64) -> f64 {
+        let aim = self.slot.aim(self.lower);
+        if self.slot.dirty {
+            aim * dirt_gap.max(LEAST_DIRT)
+        } else {
+            aim
+        }
     }
 
     /// Draws sites and finds the sizes at which each cause alone reaches its share of the target.
@@ -150,7 +196,7 @@ impl Draw<'_> {
         Ok(found)
     }
 
-    /// The world with all dirt and causes. Causes come after dirt.
+    /// The world with all dirt and causes. Causes come after dirt, and transmissions last.
     pub(super) fn world(
         &self,
         bench: &Bench<'_>,
@@ -163,17 +209,8 @@ impl Draw<'_> {
         let (between, others): (Vec<&Item>, Vec<&Item>) = dirt
             .iter()
             .chain(&causes.items)
-            .partition(|i| matches!(i.cause.name(), "backlash" | "joint-compliance"));
-        // A joint can have one transmission only. A cause's transmission takes precedence over that
-        // of dirt.
-        let mut joints: Vec<&str> = Vec::new();
+            .partition(|i| is_transmission(i.cause));
         for item in others.into_iter().chain(between.into_iter().rev()) {
-            if matches!(item.cause.name(), "backlash" | "joint-compliance") {
-                if joints.contains(&item.site.as_str()) {
-                    continue;
-                }
-                joints.push(&item.site);
-            }
             item.act(self.anatomy, &bench.typical, &mut world);
         }
         Ok(world)
@@ -203,5 +240,83 @@ impl Draw<'_> {
                 })
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::anatomy::Anatomy;
+    use crate::causes;
+    use crate::machines::servo;
+    use crate::motion::Motion;
+    use crate::plan::Slot;
+    use crate::random::stream;
+
+    /// A dirty case of the causes, on a machine of one driven joint.
+    fn draw<'a>(anatomy: &'a Anatomy, kind: Kind, causes: &[&str]) -> Draw<'a> {
+        let slot = Slot {
+            machine: 0,
+            kind,
+            causes: causes.iter().filter_map(|c| causes::named(c)).collect(),
+            same_joint: false,
+            dirty: true,
+            level: 1,
+            fault: None,
+            wiring: None,
+            little: false,
+        };
+        Draw {
+            anatomy,
+            slot,
+            random: stream(3, &["clash"]),
+            lower: 0,
+            pace: [0.5, 0.3],
+        }
+    }
+
+    /// Symptom: labels listed a compliance among the dirt that was not in the world. Cause: the
+    /// world left out the transmission of dirt beside that of a cause; the label did not.
+    #[test]
+    fn dirt_has_no_transmission_at_the_joint_of_a_transmission_that_is_a_cause() -> Result<()> {
+        let anatomy = Anatomy::of(&servo::MACHINE)?;
+        let mut draw = draw(&anatomy, Kind::Single, &["backlash"]);
+        let style = draw.usual();
+        let motions: Vec<Motion> = (0..SAMPLE)
+            .map(|_| Motion::draw(&anatomy, style, &mut draw.random))
+            .collect();
+        let step = anatomy.timestep;
+        let bench = Bench::new(&anatomy, &[0.4], &motions, step, "implicitfast")?;
+        let items = dirt::draw(&anatomy, &bench.typical, &mut draw.random);
+        let compliant = |items: &[Item]| items.iter().any(|i| is_transmission(i.cause));
+        assert!(compliant(&items));
+        let gap = draw.gap_of(&bench, &items)?;
+        let mut dirt = Background { items, gap };
+        let Ok((causes, target)) = draw.sized_causes(&bench, &mut dirt, &mut Vec::new()) else {
+            panic!("the causes cannot be sized");
+        };
+        assert!(compliant(&causes.items) && !compliant(&dirt.items));
+        // Gap and target are those of the dirt that is left.
+        assert_eq!(dirt.gap, draw.gap_of(&bench, &dirt.items)?);
+        assert_eq!(target, draw.target(dirt.gap));
+        Ok(())
+    }
+
+    /// Symptom: a case had backlash and a compliance, one of them without effect. Cause: the draw of
+    /// other causes lacked the exclusion of the plan.
+    #[test]
+    fn other_causes_are_not_two_transmissions() -> Result<()> {
+        let anatomy = Anatomy::of(&servo::MACHINE)?;
+        let mut draw = draw(&anatomy, Kind::Several, &["mass", "viscous-friction"]);
+        let mut transmissions = 0;
+        for _ in 0..2000 {
+            draw.other_causes();
+            let causes = draw.slot.causes.iter().copied();
+            let count = causes.filter(|&c| is_transmission(c)).count();
+            assert!(count < 2 && draw.slot.causes.len() == 2);
+            transmissions += count;
+        }
+        assert!(transmissions > 0);
+        Ok(())
     }
 }

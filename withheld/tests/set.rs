@@ -75,6 +75,15 @@ fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
         for place in &label.places {
             assert!(place.share <= label.signals[&place.signal] + 1e-9, "{case}");
         }
+        // A joint has one transmission: what the label lists is in the world.
+        let transmits = |effect: &str| ["backlash", "joint-compliance"].contains(&effect);
+        for dirt in label.dirt.iter().filter(|d| transmits(&d.effect)) {
+            let clashes = |e: &String| {
+                e.split_once('@')
+                    .is_some_and(|(effect, site)| transmits(effect) && site == dirt.site)
+            };
+            assert!(!label.effects.iter().any(clashes), "{case}");
+        }
         let share = label.target_gap / (label.own_gaps.len().max(1) as f64).sqrt();
         for (cause, gap) in &label.own_gaps {
             assert!(
