@@ -20,7 +20,7 @@
 
 use std::collections::BTreeMap;
 
-use asid_core::Result;
+use asid_core::{Parameter, Result};
 
 use super::Telling;
 use crate::bench::Explanation;
@@ -89,6 +89,12 @@ fn between_episodes(parts: &[Vec<f64>], values: usize) -> Vec<f64> {
         }
     };
     (0..values).map(of_value).collect()
+}
+
+/// Whether a value is at an end of its range, on the parameter's scale.
+fn is_at_end(parameter: &Parameter, value: f64) -> bool {
+    let share = parameter.to_unit(value);
+    share < AT_END || 1.0 - share < AT_END
 }
 
 /// A value with its uncertainty.
@@ -164,8 +170,7 @@ impl Telling<'_> {
         } else {
             f64::INFINITY
         };
-        let end = AT_END * (high - low);
-        let at_bound = value - low < end || high - value < end;
+        let at_bound = is_at_end(&of.unknowns[unknown].parameter, value);
         // The logs ask for a value of the study's parameter beyond its range. Within the range
         // nothing determines it.
         let is_of_study = unknown < self.bench.parameters.len();
@@ -238,8 +243,29 @@ impl Telling<'_> {
 
 #[cfg(test)]
 mod tests {
+    use asid_core::parameter::Scale;
+
     use super::*;
     use crate::data::tests::{log, plant};
+
+    /// Symptom: a friction of 5e-6 within a range from 1e-6 to 10 on a log scale was told as at the
+    /// end of it. Cause: its distance from the end was compared with the length of the range.
+    #[test]
+    fn an_end_of_a_range_is_on_the_scale_of_the_parameter() {
+        let of = |scale, range| Parameter {
+            name: "friction".to_owned(),
+            targets: Vec::new(),
+            range,
+            scale,
+            unit: String::new(),
+        };
+        let friction = of(Scale::Log, [1e-6, 10.0]);
+        let is_end = [1e-6, 5e-6, 1.0, 10.0].map(|x| is_at_end(&friction, x));
+        assert_eq!(is_end, [true, false, false, true]);
+        let offset = of(Scale::Linear, [-1.0, 1.0]);
+        let is_end = [-1.0, -0.999, 0.999, 1.0].map(|x| is_at_end(&offset, x));
+        assert_eq!(is_end, [true, false, false, true]);
+    }
 
     /// Symptom: the intervals of values were too narrow for a sensor that reads at every second
     /// row. Cause: the residual of a missing reading, 0, was used as that of a reading.
