@@ -210,6 +210,37 @@ fn several_effects_compose() {
     assert!(without > 0.05);
 }
 
+/// Two links, of which the second and a weight lie in a frame that is moved and turned.
+const FRAMED: &str = r#"<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
+  <body name="base"><joint name="swing" axis="0 1 0" damping="0.1"/><geom name="base" size="0.05" mass="1"/>
+    <frame pos="0.1 0 -0.2"><frame pos="0.1 0 0" quat="0.9 0.3 0.2 0.1">
+      <geom name="weight" size="0.03" mass="0.3" pos="0 0.1 0"/>
+      <body name="link" pos="0.1 0 0"><joint name="turn" axis="0 1 0" damping="0.1"/>
+        <geom name="link" size="0.05" mass="0.5" pos="0 0 0.2"/></body></frame></frame></body></worldbody>
+  <actuator><motor name="push" joint="turn"/></actuator>
+  <sensor><jointpos name="q1" joint="swing"/><jointpos name="q2" joint="turn"/></sensor></mujoco>"#;
+
+/// Symptom: an exported body or geom inside a `<frame>` was elsewhere.
+///
+/// Cause: its place in the frame of its body was written, and MuJoCo applied the frame again.
+#[test]
+fn a_place_inside_a_frame_is_written_as_the_frame_sees_it() {
+    for target in ["body/link/pos/0", "geom/weight/pos/2"] {
+        let model = refined(FRAMED, &[(target, 0.35)], &[]);
+        let ([_, left], [_, without]) = distances(&model, &[]);
+        assert!(left < EXACT, "{target}: {left} of {without}");
+        assert!(without > 1e-3, "{target} does nothing here: {without}");
+    }
+    let xml = FRAMED.replace(r#"quat="0.9 0.3 0.2 0.1""#, r#"euler="20 0 0""#);
+    let written = exported(&refined(&xml, &[("body/link/pos/0", 0.35)], &[]));
+    assert_eq!(written.xml, xml);
+    let sentences = written.sentences().join("\n");
+    assert!(
+        sentences.contains("body `link` lies in a <frame>"),
+        "{sentences}"
+    );
+}
+
 /// Symptom: an exported servo with a `timeconst` answered without its lag.
 ///
 /// Cause: a gain or a bias of its command is written in the long form, with `dyntype="none"`.

@@ -29,7 +29,7 @@ impl Writer<'_, '_> {
             }
             for attribute in ["pos", "axis"] {
                 if let Some(values) = self.entries("joint", &joint.name, attribute, 3)? {
-                    self.markup.set_numbers(node, attribute, &values);
+                    self.write_place(&format!("joint `{}`", joint.name), node, attribute, &values);
                 }
             }
             let unit = match joint.kind {

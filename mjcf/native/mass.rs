@@ -14,7 +14,7 @@ impl Writer<'_, '_> {
             let name = self.native.plant.layout.bodies[i].clone();
             let node = self.elements.bodies[i];
             if let Some(pos) = self.entries("body", &name, "pos", 3)? {
-                self.markup.set_numbers(node, "pos", &pos);
+                self.write_place(&format!("body `{name}`"), node, "pos", &pos);
             }
             if let Some(&share) = self.native.gravity_compensation.get(&i) {
                 let own: f64 = node

@@ -8,6 +8,7 @@
 mod actuator;
 mod assets;
 mod elements;
+mod frame;
 mod joint;
 mod mass;
 mod transmission;
@@ -281,7 +282,11 @@ impl Writer<'_, '_> {
                     ));
                     continue;
                 }
-                self.markup.set_numbers(node, attribute, &values);
+                if attribute == "pos" {
+                    self.write_place(&format!("geom `{name}`"), node, attribute, &values);
+                } else {
+                    self.markup.set_numbers(node, attribute, &values);
+                }
             }
         }
         Ok(())

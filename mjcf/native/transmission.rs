@@ -11,6 +11,7 @@ use asid_core::error::Result;
 use asid_core::layout::JointKind;
 use roxmltree::Node;
 
+use super::frame::is_framed;
 use super::{Series, Writer};
 use crate::markup::{escaped, numbers};
 use crate::plant::DriveLaw;
@@ -43,6 +44,12 @@ impl Writer<'_, '_> {
         else {
             return Ok(String::new());
         };
+        if is_framed(node) {
+            self.leave_out(format!(
+                "joint `{name}` lies in a <frame>: the play or elasticity between it and its drive is not written"
+            ));
+            return Ok(String::new());
+        }
         let label = self.native.plant.layout.actuators[actuator].name.clone();
         let timestep = self.native.plant.layout.timestep;
         let get = |w: &Self, attribute: &str| w.value(&Target::new("joint", &name, attribute, 0));
