@@ -302,7 +302,7 @@ mod tests {
         Ok(())
     }
 
-    /// Symptom: a case had backlash and a compliance, one of them without effect. Cause: the draw of
+    /// Symptom: a case had backlash and compliance, one of them without effect. Cause: the draw of
     /// other causes lacked the exclusion of the plan.
     #[test]
     fn other_causes_are_not_two_transmissions() -> Result<()> {
