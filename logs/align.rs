@@ -8,8 +8,8 @@
 
 use crate::series::Series;
 
-/// A stream with fewer samples than this share of the rows is slower: its samples go to single
-/// rows.
+/// A stream with fewer samples in the time of the rows than this share of their number is slower:
+/// its samples go to single rows.
 const SLOWER: f64 = 0.7;
 /// Multiple of the usual step between samples beyond which samples were lost.
 pub const LOST: f64 = 2.5;
@@ -38,8 +38,8 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
     stamps.sort_by(f64::total_cmp);
     stamps.dedup();
     // The first and last row are complete: the initial state must be known.
-    let count = stamps.len();
-    for s in readings.iter().filter(|s| !is_slower(s, count)) {
+    let all = stamps.clone();
+    for s in readings.iter().filter(|s| !is_slower(s, &all)) {
         if let (Some(first), Some(last)) = (s.time.first(), s.time.last()) {
             stamps.retain(|t| (*first..=*last).contains(t));
         }
@@ -47,9 +47,14 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
     stamps
 }
 
-/// Whether a series has far fewer samples than there are rows.
-fn is_slower(series: &Series, rows: usize) -> bool {
-    (series.time.len() as f64) < SLOWER * rows as f64
+/// Whether a series has far fewer samples than there are rows, from the first row to the last.
+fn is_slower(series: &Series, rows: &[f64]) -> bool {
+    let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else {
+        return false;
+    };
+    let up_to_last = series.time.partition_point(|t| *t <= last);
+    let before = series.time.partition_point(|t| *t < first);
+    (up_to_last.saturating_sub(before) as f64) < SLOWER * rows.len() as f64
 }
 
 /// A series' readings at the rows; NaN where it has none.
@@ -57,7 +62,7 @@ fn is_slower(series: &Series, rows: usize) -> bool {
 pub fn readings(series: &Series, rows: &[f64]) -> Vec<f64> {
     let mut column = vec![f64::NAN; rows.len()];
     let usual = usual_step(series);
-    if is_slower(series, rows.len()) {
+    if is_slower(series, rows) {
         for time in &series.time {
             let Some(row) = nearest(rows, *time) else {
                 continue;
@@ -200,6 +205,18 @@ mod tests {
         gap.values.drain(5..10);
         let column = readings(&gap, &rows);
         assert!(column[7].is_nan() && column[3].is_finite() && column[12].is_finite());
+    }
+
+    /// Symptom: a slow stream had a reading in each row.
+    ///
+    /// Cause: it counted as fast, since it was recorded for so long that it had as many samples as
+    /// there are rows.
+    #[test]
+    fn a_slower_stream_that_is_recorded_for_longer_stays_slower() {
+        let rows: Vec<f64> = (0..21).map(|k| 5.0 + 0.1 * f64::from(k)).collect();
+        let column = readings(&line("/b", 0.5, 0.02, 40), &rows);
+        let read = column.iter().filter(|x| x.is_finite()).count();
+        assert_eq!(read, 5, "one reading in half a second: {column:?}");
     }
 
     #[test]
