@@ -67,6 +67,13 @@ fn percent(range: [f64; 2], reason: &str) -> Unit {
     }
 }
 
+/// Whether values are from 0 to 100, as shares of a range are.
+fn is_share(series: &Series) -> bool {
+    let slack = BEYOND * 100.0;
+    let mut values = series.values.iter().filter(|x| x.is_finite());
+    values.all(|x| (-slack..=100.0 + slack).contains(x))
+}
+
 /// The unit of a series, if it holds a quantity.
 #[must_use]
 pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat) -> Unit {
@@ -77,13 +84,20 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat
         ("cm", Some(Measure::Velocity)) => "cm/s",
         (unit, _) => unit,
     };
+    let position = quantity.measure == Some(Measure::Position);
     if let Some(named) = words.unit {
         return match (named, quantity.range) {
-            ("%", Some(range)) => percent(range, "named so"),
+            ("%", Some(range)) if position && is_share(series) => percent(range, "named so"),
+            ("%", _) => {
+                let factor = crate::episode::unit_factor("%").unwrap_or(1.0);
+                Unit {
+                    fits: allows(quantity, series, factor),
+                    ..Unit::named("%", "named so")
+                }
+            }
             _ => Unit::named(per_second(named), "named so"),
         };
     }
-    let position = quantity.measure == Some(Measure::Position);
     // A table may hold LeRobot's data, under LeRobot's names.
     let features = ["action.", "observation.state."];
     let named_so =
@@ -161,6 +175,31 @@ mod tests {
             values: values.to_vec(),
             ..Series::default()
         }
+    }
+
+    /// Symptom: a motor's command of 0 % was read as its lowest command.
+    ///
+    /// Cause: percentages counted as shares of the range, from its lower end, whatever they are of.
+    #[test]
+    fn a_percentage_of_a_motor_is_signed() {
+        let position = quantity(Dimension::Angle, Some([-1.0, 1.0]));
+        let motor = Quantity {
+            measure: Some(Measure::Effort),
+            dimension: Dimension::Other,
+            ..position.clone()
+        };
+        let of = |q: &Quantity, values: &[f64]| {
+            let words = Words::of("u_percent");
+            let found = unit(q, &series(values), &words, LogFormat::Csv);
+            (found.name, found.scale, found.offset, found.fits)
+        };
+        let plain = (Some("%"), 1.0, 0.0, true);
+        assert_eq!(of(&motor, &[-80.0, 0.0, 90.0]), plain);
+        assert_eq!(of(&motor, &[0.0, 90.0]), plain);
+        assert!(!of(&motor, &[0.0, 900.0]).3);
+        // A position of a range may be a share of it, or be signed as well.
+        assert_eq!(of(&position, &[0.0, 90.0]), (Some("%"), 2.0, -1.0, true));
+        assert_eq!(of(&position, &[-80.0, 90.0]), plain);
     }
 
     #[test]
