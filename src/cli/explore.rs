@@ -106,7 +106,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
     let played = nominal_world(&session, &center)?
         .with_exploration_start(start.clone())
         .explore(&mut *explored.policy)?;
-    let real = if config.real.is_simulator() {
+    let real = if config.real.is_left_open(&config.backend) {
         None
     } else {
         let mut world = session

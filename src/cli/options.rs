@@ -111,8 +111,8 @@ pub struct Simulator {
 pub struct Real {
     /// Play in this kind of real world: matched (the simulator itself), crossed (the other engine),
     /// perturbed (step, contacts, masses, servos and tracker a little off) or stand-in (another
-    /// object) [default: matched; with --real-model, --real-effect or another --real-backend the
-    /// world is called custom]
+    /// object) [default: matched; with --model, --real-model, --real-effect or another
+    /// --real-backend the world is called custom]
     #[arg(long, value_name = "KIND")]
     pub world: Option<String>,
     /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06

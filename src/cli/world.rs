@@ -71,7 +71,7 @@ impl World {
             tracker: TrackerErrors::default(),
             perturbed: None,
         };
-        if real.world == WorldKind::Matched {
+        if real.is_scene_on(&session.config.backend) {
             return Ok(plain(Arc::clone(simulator)));
         }
         let engine = backend(&real.backend)?;

@@ -230,7 +230,7 @@ impl Machine {
         let counted = &before[..before.len().min(n as usize)];
         let mut trials = Vec::new();
         let real = &session.config.real;
-        if real.world != asid_worlds::WorldKind::Matched {
+        if !real.is_scene_on(&session.config.backend) {
             progress.begin("without the effect", n);
             let plain = Worlds {
                 real: Real {

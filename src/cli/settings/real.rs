@@ -44,9 +44,17 @@ fn follows(kind: &WorldKind) -> bool {
 }
 
 impl RealConfig {
-    /// Whether the settings describe no real world other than the simulator.
-    pub fn is_simulator(&self) -> bool {
-        self.world == WorldKind::Matched && self.truth.is_empty()
+    /// Whether the world is the task's scene as it is, on this engine.
+    pub fn is_scene_on(&self, engine: &str) -> bool {
+        matches!(self.world, WorldKind::Matched | WorldKind::Custom)
+            && self.backend == engine
+            && self.model.is_none()
+            && self.effects.is_empty()
+    }
+
+    /// Whether the settings say nothing of a real world of its own, beside the simulator's engine.
+    pub fn is_left_open(&self, simulator: &str) -> bool {
+        self.is_scene_on(simulator) && self.truth.is_empty()
     }
 }
 
@@ -80,7 +88,7 @@ pub fn resolve(
     let made = real.model.is_some() || !real.effects.is_empty();
     real.world = match options.world.clone().or(text(table, "world")?) {
         Some(name) => name.parse()?,
-        None if other || made => WorldKind::Custom,
+        None if other || made || own_model => WorldKind::Custom,
         None => WorldKind::Matched,
     };
     let kind = real.world;
@@ -163,4 +171,30 @@ fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
         .chain(&real.real_effect)
         .map(|text| Ok(text.parse::<EffectSpec>()?.to_string()))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::registry::{TaskEntry, find};
+
+    use super::*;
+
+    /// Symptom: a run whose simulator had another model called its real world matched. Cause: only
+    /// the real world's own engine, model and effects made a world custom.
+    #[test]
+    fn the_scene_is_no_matched_world_of_a_simulator_with_another_model() {
+        let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
+        let of = |own_model: bool| {
+            let (table, options) = (toml::Table::new(), Real::default());
+            let simulator = ("rapier", own_model);
+            resolve(&table, &options, &*task, &task.parameters(), simulator).unwrap()
+        };
+        let (matched, custom) = (of(false), of(true));
+        assert_eq!(matched.world, WorldKind::Matched);
+        assert_eq!(custom.world, WorldKind::Custom);
+        // Both are the task's scene.
+        for real in [matched, custom] {
+            assert!(real.is_scene_on("rapier") && !real.is_scene_on("mujoco"));
+        }
+    }
 }
