@@ -27,11 +27,15 @@ pub fn read_table(path: &Path) -> Result<toml::Table> {
     };
     let text = std::fs::read_to_string(path).map_err(|e| file(e.to_string()))?;
     Ok(toml_text::read(&text).map_err(|e| {
-        let line = e.span().map_or(0, |s| {
-            text[..s.start.min(text.len())].lines().count().max(1)
-        });
+        let line = e.span().map_or(0, |s| line_of(&text, s.start));
         file(format!("line {line}: {}", e.message()))
     })?)
+}
+
+/// Number of the line, from 1, that holds the byte at an offset.
+fn line_of(text: &str, offset: usize) -> usize {
+    let before = text.bytes().take(offset);
+    before.filter(|&byte| byte == b'\n').count() + 1
 }
 
 /// The configuration file of a command, or the table that replaces it.
@@ -158,4 +162,28 @@ pub fn numbers(name: &str, table: &toml::Table) -> Result<BTreeMap<String, f64>>
                 })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: an error at the beginning of a line named the line before. Cause: the lines of the
+    /// text before it were counted, of which the last had just ended.
+    #[test]
+    fn an_error_at_the_beginning_of_a_line_names_that_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        for (text, expected) in [
+            ("seed = 1\n= 2\n", "line 2: "),
+            ("= 2\n", "line 1: "),
+            ("seed = 1\n\nworld = matched\n", "line 3: "),
+        ] {
+            std::fs::write(&file, text).unwrap();
+            let error = read_table(&file).unwrap_err().to_string();
+            assert!(error.contains(expected), "{text:?}: {error}");
+        }
+        let text = "a\nb\n";
+        assert_eq!([0, 1, 2, 3].map(|at| line_of(text, at)), [1, 1, 2, 2]);
+    }
 }
