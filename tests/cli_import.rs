@@ -480,6 +480,32 @@ fn the_state_of_the_first_row_is_said_to_be_read() {
         said.contains("\nstate of the first row: qpos.pan, qvel.pan\nnot used: odd\n"),
         "{said}"
     );
+    copies_hold_the_state_of_the_first_row(&logs, folder.path());
+}
+
+/// Symptom: the table said that the state of the first row is read, and copies of the logs were
+/// without it. A single log, which is cut into parts, is always copied.
+///
+/// Cause: an episode was written without its initial state.
+fn copies_hold_the_state_of_the_first_row(logs: &[PathBuf], folder: &Path) {
+    let (whole, cut) = (folder.join("whole"), folder.join("cut"));
+    told(&import(logs, &whole, &["--copy"]));
+    told(&import(&logs[..1], &cut, &[]));
+    let lines = |path: PathBuf| -> [String; 3] {
+        let text = std::fs::read_to_string(path).unwrap();
+        let mut lines = text.lines().map(str::to_owned);
+        [(); 3].map(|()| lines.next().unwrap())
+    };
+    for path in [whole.join("train_0.csv"), cut.join("train_0.csv")] {
+        let [header, first, second] = lines(path);
+        assert!(header.ends_with(",qpos.pan,qvel.pan"), "{header}");
+        assert!(first.ends_with(",0.1,0"), "{first}");
+        assert!(second.ends_with(",,"), "{second}");
+    }
+    let [header, ..] = lines(cut.join("train_1.csv"));
+    assert!(!header.contains("qpos"), "{header}");
+    let study = Study::read(&whole).unwrap();
+    assert!(study.train.iter().all(|(_, e)| e.initial.is_some()));
 }
 
 #[test]

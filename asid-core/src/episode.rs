@@ -50,6 +50,27 @@ impl InitialState {
     pub fn is_complete(&self) -> bool {
         self.qpos.iter().chain(&self.qvel).all(|x| x.is_finite())
     }
+
+    /// Names of columns and values of the known entries.
+    fn columns(&self, layout: &Layout) -> Vec<(String, f64)> {
+        let mut all = Vec::new();
+        for joint in &layout.joints {
+            for (prefix, values, first, len) in [
+                ("qpos", &self.qpos, joint.qpos, joint.kind.qpos_len()),
+                ("qvel", &self.qvel, joint.qvel, joint.kind.qvel_len()),
+            ] {
+                let own = values.iter().skip(first).take(len).enumerate();
+                for (i, value) in own.filter(|(_, x)| x.is_finite()) {
+                    let name = match len {
+                        1 => format!("{prefix}.{}", joint.name),
+                        _ => format!("{prefix}.{}.{i}", joint.name),
+                    };
+                    all.push((name, *value));
+                }
+            }
+        }
+        all
+    }
 }
 
 impl Episode {
@@ -154,6 +175,21 @@ impl Episode {
     /// # Errors
     /// When the file cannot be written.
     pub fn write_csv(&self, path: &Path) -> Result<()> {
+        self.write_beside(path, &[])
+    }
+
+    /// Writes the log with the known part of its initial state, as `qpos.JOINT` and `qvel.JOINT` in
+    /// the first row.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_csv_with_start(&self, path: &Path, layout: &Layout) -> Result<()> {
+        let start = self.initial.as_ref().map(|state| state.columns(layout));
+        self.write_beside(path, &start.unwrap_or_default())
+    }
+
+    /// Writes the log, with further columns that have a number in the first row only.
+    fn write_beside(&self, path: &Path, start: &[(String, f64)]) -> Result<()> {
         let mut header = vec!["time".to_owned()];
         header.extend(self.actuators.iter().map(|a| format!("ctrl.{a}")));
         for c in &self.channels {
@@ -163,6 +199,7 @@ impl Episode {
                 header.extend((0..c.len).map(|i| format!("{}.{i}", c.name)));
             }
         }
+        header.extend(start.iter().map(|(name, _)| name.clone()));
         let header: Vec<String> = header.iter().map(|name| quoted(name)).collect();
         let mut text = header.join(",");
         text.push('\n');
@@ -175,6 +212,12 @@ impl Episode {
             {
                 text.push(',');
                 if x.is_finite() {
+                    text += &cell(*x);
+                }
+            }
+            for (_, x) in start {
+                text.push(',');
+                if i == 0 {
                     text += &cell(*x);
                 }
             }

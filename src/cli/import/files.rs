@@ -122,20 +122,23 @@ impl Files<'_> {
     /// Copies of the episodes as files.
     fn copies(&self, folder: &Path) -> Result<(Vec<String>, Vec<String>)> {
         let (mut train, mut test) = (Vec::new(), Vec::new());
+        let layout = &self.subject.plant.layout;
         if self.is_cut() {
             let episode = &self.imported[0].episode;
             for part in 0..PARTS {
                 let rows = episode.rows() * part / PARTS..episode.rows() * (part + 1) / PARTS;
                 let held = part + 1 == PARTS;
                 let name = format!("{}_{part}.csv", if held { "test" } else { "train" });
-                episode.part(rows).write_csv(&folder.join(&name))?;
+                let part = episode.part(rows);
+                part.write_csv_with_start(&folder.join(&name), layout)?;
                 if held { &mut test } else { &mut train }.push(name);
             }
             return Ok((train, test));
         }
         for (i, one) in self.imported.iter().enumerate() {
             let name = format!("{}_{i}.csv", if one.test { "test" } else { "train" });
-            one.episode.write_csv(&folder.join(&name))?;
+            let path = folder.join(&name);
+            one.episode.write_csv_with_start(&path, layout)?;
             if one.test { &mut test } else { &mut train }.push(name);
         }
         Ok((train, test))
