@@ -8,6 +8,7 @@
 
 use std::path::Path;
 
+use asid_documents::toml_text;
 use sha2::{Digest, Sha256};
 
 use crate::method::{Method, NONE, TRUTH};
@@ -112,7 +113,7 @@ fn of_chain(path: &Path, depth: usize) -> Option<String> {
         return of_file(path);
     }
     let text = std::fs::read_to_string(path).ok()?;
-    let Ok(mut table) = text.parse::<toml::Table>() else {
+    let Ok(mut table) = toml_text::read::<toml::Table>(&text) else {
         return of_file(path);
     };
     if let Some(toml::Value::String(model)) = table.get_mut(MODEL)
