@@ -175,7 +175,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("settings.toml");
         for (text, expected) in [
-            ("seed = 1\n= 2\n", "line 2: "),
+            ("seed = 1\nseed = 2\n", "line 2: "),
             ("= 2\n", "line 1: "),
             ("seed = 1\n\nworld = matched\n", "line 3: "),
         ] {
