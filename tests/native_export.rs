@@ -210,6 +210,25 @@ fn several_effects_compose() {
     assert!(without > 0.05);
 }
 
+/// Symptom: an exported constant force was larger on a body with another mass.
+///
+/// Cause: it is written as a share of the weight, and this was the weight before the change.
+#[test]
+fn a_constant_force_does_not_grow_with_the_mass() {
+    for body in ["lower", "upper"] {
+        let force = format!("constant-force@{body}:z=1.5");
+        let mass = format!("mass@{body}:factor=1.4");
+        let ([_, left], [_, without]) = distances(&refined(ARM, &[], &[&force, &mass]), &[]);
+        assert!(left < EXACT, "{body}: {left} of {without}");
+    }
+    let effects = ["constant-force@lower:z=1.5", "gravity-tilt:pitch=0.1"];
+    let sentences = exported(&refined(ARM, &[], &effects)).sentences();
+    assert!(
+        sentences.iter().any(|s| s.contains("another gravity")),
+        "{sentences:?}"
+    );
+}
+
 /// Two links, of which the second and a weight lie in a frame that is moved and turned.
 const FRAMED: &str = r#"<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
   <body name="base"><joint name="swing" axis="0 1 0" damping="0.1"/><geom name="base" size="0.05" mass="1"/>

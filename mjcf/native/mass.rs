@@ -10,6 +10,14 @@ use crate::mass::{GeomMass, MassProperties};
 
 impl Writer<'_, '_> {
     pub(super) fn write_bodies(&mut self) -> Result<()> {
+        if !self.native.gravity_compensation.is_empty()
+            && self.entries("option", "", "gravity", 3)?.is_some()
+        {
+            self.leave_out(
+                "constant forces are written as shares of weights, which another gravity changes with the weights"
+                    .into(),
+            );
+        }
         for i in 1..self.native.plant.layout.bodies.len() {
             let name = self.native.plant.layout.bodies[i].clone();
             let node = self.elements.bodies[i];
@@ -21,6 +29,8 @@ impl Writer<'_, '_> {
                     .attribute("gravcomp")
                     .and_then(|x| x.parse().ok())
                     .unwrap_or(0.0);
+                // The share is of the weight in the document.
+                let share = share * self.native.plant.bodies[i].mass / self.mass_of(i, &name)?;
                 self.markup.set_numbers(node, "gravcomp", &[own + share]);
             }
             let mass = self.entries("body", &name, "mass", 1)?.map(|m| m[0]);
@@ -35,6 +45,24 @@ impl Writer<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Mass that a body will have, kg.
+    fn mass_of(&self, i: usize, name: &str) -> Result<f64> {
+        if let Some(mass) = self.entries("body", name, "mass", 1)? {
+            return Ok(mass[0]);
+        }
+        let plant = self.native.plant;
+        let own = self.model.nominal(&Target::new("body", name, "mass", 0));
+        // An engine may have no mass of a body whose geoms have one.
+        let mut mass = own.unwrap_or(plant.bodies[i].mass);
+        for geom in plant.geoms_with_mass(name) {
+            let target = Target::new("geom", &plant.layout.geoms[geom], "mass", 0);
+            if let Some(value) = self.changed(&target)? {
+                mass += value - self.model.nominal(&target)?;
+            }
+        }
+        Ok(mass)
     }
 
     /// Changes the body's existing `<inertial>`.

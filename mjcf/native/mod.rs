@@ -94,7 +94,7 @@ pub struct NativeModel<'p> {
     pub values: Vec<(Target, f64)>,
     actuators: BTreeMap<usize, NativeActuator>,
     joints: BTreeMap<usize, NativeJoint>,
-    /// Share of a body's weight that is compensated, to add.
+    /// Share of a body's weight in the scene that is compensated, to add.
     gravity_compensation: BTreeMap<usize, f64>,
     /// Delays of sensors, s.
     sensor_delays: BTreeMap<usize, f64>,
@@ -143,7 +143,9 @@ impl<'p> NativeModel<'p> {
         Ok(self.joints.entry(index).or_default())
     }
 
-    /// Adds to the share of a body's weight that is compensated (`gravcomp`).
+    /// Adds to the share of a body's weight in the scene that is compensated (`gravcomp`).
+    ///
+    /// It is a constant force: another mass of the body leaves it as it is.
     ///
     /// # Errors
     /// When there is no such body.
