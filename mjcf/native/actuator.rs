@@ -187,7 +187,7 @@ impl Writer<'_, '_> {
         }
     }
 
-    /// The filter that the document gives an actuator: its `dyntype`, and `dynprm` where it is said.
+    /// The filter that the document gives an actuator: its `dyntype`, and `dynprm` if it is said.
     fn filter(&self, node: Node<'_, '_>) -> Option<(String, Option<String>)> {
         // The other short forms have none.
         if !matches!(node.tag_name().name(), "position" | "general") {

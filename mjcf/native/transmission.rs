@@ -3,8 +3,8 @@
 //! The joint that the drive acts on keeps its name and becomes the rotor's. A second joint follows,
 //! in the same body and about the same axis: the link's against the rotor. It is free within a
 //! `range` as wide as the gap, or held by a spring with its damper. Properties of the sum of the
-//! two (damping, dry friction, the joint's own spring and range, its sensors) move to a fixed tendon
-//! over both.
+//! two (damping, dry friction, the joint's own spring and range, its sensors) move to a fixed
+//! tendon over both.
 
 use asid_core::Target;
 use asid_core::error::Result;
@@ -128,8 +128,8 @@ impl Writer<'_, '_> {
         ))
     }
 
-    /// Moves the spring of the joint to the tendon, so that it acts on the link; returns the tendon's
-    /// attribute.
+    /// Moves the spring of the joint to the tendon, so that it acts on the link; returns the
+    /// tendon's attribute.
     ///
     /// MuJoCo rests the spring of a tendon where the springs of its joints rest, so the joint keeps
     /// its `springref`.

@@ -122,8 +122,9 @@ mod tests {
 
     /// Symptom: a free body began beside where a sensor had seen it.
     ///
-    /// Cause: each frame sensor with the name of a body counted as reading the body's frame, whether
-    /// it reads a geom or site of that name, the centre of mass, or a difference to another frame.
+    /// Cause: each frame sensor with the name of a body counted as reading the body's frame, also
+    /// where it reads a geom or site of that name, the centre of mass, or a difference to another
+    /// frame.
     #[test]
     fn a_sensor_of_another_frame_does_not_read_the_body() {
         let (other, body) = (Reads::Other, Reads::Body(1));
