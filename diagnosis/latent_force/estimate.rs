@@ -152,16 +152,13 @@ impl Estimate {
                 .enumerate()
                 .map(|(w, p)| smooth(p, &self.noise_along(context, w, 1.0)))
                 .collect();
-            // The excess of segments is no parameter of EM: it may lower their likelihood.
             let mut sums = Sums::default();
-            let mut along_rows = 0.0;
             let along = context.walks.iter().zip(&smoothed);
-            for (_, s) in along.filter(|(w, _)| w.segment.is_none()) {
-                sums.add(&s.sums);
-                along_rows += s.log_likelihood;
-            }
+            along
+                .filter(|(w, _)| w.segment.is_none())
+                .for_each(|(_, s)| sums.add(&s.sums));
             let likelihood: f64 = smoothed.iter().map(|s| s.log_likelihood).sum();
-            if likelihood.is_nan() || along_rows < before.0 {
+            if likelihood.is_nan() || likelihood < before.0 {
                 // A lengthened step went too far.
                 self.noise = before.1.clone();
                 length = 1.0;
@@ -169,7 +166,7 @@ impl Estimate {
             }
             self.log_likelihood = likelihood;
             self.smoothed = smoothed;
-            before = (along_rows, self.noise.clone());
+            before = (likelihood, self.noise.clone());
             if round + 1 < rounds {
                 self.update_noise(context, &sums, length);
                 self.update_excess(context);
