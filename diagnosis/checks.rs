@@ -5,7 +5,8 @@ mod missing;
 mod missing_force;
 mod units;
 
-use asid_core::Result;
+use asid_core::{Result, Scene};
+use asid_mjcf::memory::own_memory;
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
@@ -83,6 +84,25 @@ pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
             100.0 * missing
         ),
     )
+}
+
+/// Checks whether the model's own actuators and sensors have filters or delays.
+///
+/// The smoother places the machine at each row, and the engine forgets such a state there. Effects
+/// keep theirs.
+#[must_use]
+pub fn memory(scene: &Scene) -> Option<CheckResult> {
+    let found = own_memory(scene.xml());
+    (!found.is_empty()).then(|| {
+        check(
+            "memory",
+            false,
+            format!(
+                "the model itself has a filter or a delay, which is forgotten at each row of the logs: {}; take it out of the model and give it as an effect of a refined model (`asid list` has lags, filters and delays of drives and sensors)",
+                found.join(", ")
+            ),
+        )
+    })
 }
 
 /// Describes whether each sensor's noise is white: where it was filtered, its deviation is larger

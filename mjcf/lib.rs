@@ -13,6 +13,7 @@ pub mod document;
 pub mod kinematics;
 pub mod markup;
 pub mod mass;
+pub mod memory;
 pub mod native;
 pub mod plant;
 

@@ -6,7 +6,7 @@
 use asid_core::{Progress, Result};
 use nalgebra::{DMatrix, DVector};
 
-/// Most steps.
+/// Most Gauss-Newton steps of one fit.
 const STEPS: usize = 4;
 /// Fractions of a step that are tried, until one leaves less.
 const PARTS: [f64; 2] = [1.0, 0.5];
