@@ -5,7 +5,9 @@ from numpy.typing import NDArray
 __version__: str
 
 class Episodes:
-    """A batch of exploration episodes of a task, which step together; calls give the interpreter's lock away."""
+    """A batch of exploration episodes of a task, which step together; calls give the interpreter's
+    lock away.
+    """
 
     def __init__(self, task: str, episodes: int, *, backend: str | None = None, objective: str | None = None, form: str | None = None, nuisance: bool | None = None, threads: int = 0, seed: int = 0) -> None: ...
 
@@ -46,7 +48,8 @@ class Episodes:
     def step(self, actions: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float32]]:
         """One control step: actions are episodes x entries from -1 to 1, and are clipped to that.
 
-        Returns observations to act on next, rewards, terminated, truncated, and the observations before any reset.
+        Returns observations to act on next, rewards, terminated, truncated, and the observations
+        before any reset.
         """
 
     @property
