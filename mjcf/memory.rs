@@ -20,10 +20,7 @@ pub fn own_memory(xml: &str) -> Vec<String> {
             .any(|section| is_in(node, section))
     };
     let elements = document.descendants().filter(Node::is_element);
-    elements
-        .filter(remembers)
-        .flat_map(|node| of_element(node))
-        .collect()
+    elements.filter(remembers).flat_map(of_element).collect()
 }
 
 /// The filters and delays of one element.
@@ -38,7 +35,7 @@ fn of_element(node: Node<'_, '_>) -> Vec<String> {
         Some(value) => value.trim().parse::<f64>() != Ok(0.0),
     };
     let attributes = ["timeconst", "dyntype", "delay"];
-    let set = attributes.iter().copied().filter(|a| is_set(&a));
+    let set = attributes.iter().copied().filter(is_set);
     set.map(|attribute| format!("{attribute} of {place}"))
         .collect()
 }
