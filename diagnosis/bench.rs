@@ -38,6 +38,42 @@ pub struct Explanation {
     pub local: Vec<Option<Local>>,
 }
 
+#[cfg(test)]
+impl Explanation {
+    /// Without effects: each parameter in the middle of its range, with a covariance, and all of
+    /// so many residuals 0.
+    pub(crate) fn of_parameters(
+        parameters: &[Parameter],
+        covariance: nalgebra::DMatrix<f64>,
+        residuals: usize,
+    ) -> Self {
+        let n = parameters.len();
+        let middle = |p: &Parameter| 0.5 * (p.range[0] + p.range[1]);
+        Self {
+            effects: Vec::new(),
+            is_tolerance: Vec::new(),
+            unknowns: parameters.iter().cloned().map(Unknown::free).collect(),
+            fit: Fit {
+                point: Point {
+                    theta: parameters.iter().map(middle).collect(),
+                    starts: Vec::new(),
+                },
+                cost: 0.0,
+                residuals: vec![0.0; residuals],
+                shows: vec![1.0; n],
+                gains: nalgebra::DMatrix::zeros(n, residuals),
+                covariance,
+                unresolved: vec![false; n],
+                free: (0..n).collect(),
+                starts: std::sync::Arc::default(),
+            },
+            held_out: 0.0,
+            held_starts: Vec::new(),
+            local: vec![None; n],
+        }
+    }
+}
+
 /// A value as estimated by a fit that allows for a missing force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Local {

@@ -140,20 +140,33 @@ fn a_push_tells_the_friction_too() {
     }
 }
 
+/// What `told` says of a push of the rod at [`PUSHED`], under other settings of the tracker.
+fn of_a_push(set: &[(&str, f64)], told: impl Fn(&Problem<'_>, &[f64]) -> f64) -> f64 {
+    let set = set.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+    let task = task_support::task("rod-balancing");
+    let task = task.adjusted(&set).unwrap().unwrap();
+    let backend = (all::<BackendEntry>()[0].make)().unwrap();
+    let actions = [vec![[0.02, 0.03]; 5], vec![[0.025, 0.0]; 15]]
+        .concat()
+        .concat();
+    let mut out = f64::NAN;
+    task_support::on_engine(&*backend, &*task, &task.parameters(), 3, |problem, _| {
+        out = told(problem, &actions);
+    });
+    out
+}
+
+/// Offset of the mass in [`of_a_push`], m.
+const OFFSET: [f64; 1] = [0.05];
+/// Initial pose of the rod there.
+const PUSHED: [f64; 3] = [0.55, 0.0, 0.2];
+
 /// Symptom: the deviation that a run expects of an episode is that of a tracker which reads every
 /// frame, however slow the tracker is.
 #[test]
 fn what_a_run_expects_of_a_slow_tracker_is_less() {
-    let task = task_support::task("rod-balancing");
     let std = |rate: f64| {
-        let set = std::iter::once(("tracker_rate".to_owned(), rate)).collect();
-        let task = task.adjusted(&set).unwrap().unwrap();
-        let backend = (all::<BackendEntry>()[0].make)().unwrap();
-        let mut out = f64::NAN;
-        task_support::on_engine(&*backend, &*task, &task.parameters(), 3, |problem, _| {
-            let actions = [vec![[0.02, 0.03]; 5], vec![[0.025, 0.0]; 15]]
-                .concat()
-                .concat();
+        of_a_push(&[("tracker_rate", rate)], |problem, actions| {
             // Noise alone: systematic errors and roughness do not average out.
             let settings = ExpectedSettings {
                 assumes: Assumptions {
@@ -162,11 +175,9 @@ fn what_a_run_expects_of_a_slow_tracker_is_less() {
                 },
                 ..ExpectedSettings::default()
             };
-            let start = [0.55, 0.0, 0.2];
-            let told = expected_deviation(problem, &settings, &[0.05], &start, &actions);
-            out = told.unwrap().unwrap().last().unwrap()[0];
-        });
-        out
+            let told = expected_deviation(problem, &settings, &OFFSET, &PUSHED, actions);
+            told.unwrap().unwrap().last().unwrap()[0]
+        })
     };
     let ratio = std(10.0) / std(50.0);
     assert!((1.4..2.7).contains(&ratio), "{ratio}");
@@ -175,26 +186,16 @@ fn what_a_run_expects_of_a_slow_tracker_is_less() {
 /// Fewer or noisier readings are less informative, in proportion to their number and noise.
 #[test]
 fn a_slower_and_noisier_tracker_tells_less() {
-    let task = task_support::task("rod-balancing");
     let std = |set: &[(&str, f64)]| {
-        let set = set.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
-        let task = task.adjusted(&set).unwrap().unwrap();
-        let backend = (all::<BackendEntry>()[0].make)().unwrap();
-        let mut out = f64::NAN;
-        task_support::on_engine(&*backend, &*task, &task.parameters(), 3, |problem, _| {
-            let actions = [vec![[0.02, 0.03]; 5], vec![[0.025, 0.0]; 15]]
-                .concat()
-                .concat();
+        of_a_push(set, |problem, actions| {
             let settings = FisherSettings {
                 roughness: false,
                 nuisance: false,
                 ..FisherSettings::default()
             };
-            let start = [0.55, 0.0, 0.2];
-            let told = episode_information(problem, &settings, &[0.05], &start, &actions);
-            out = told.unwrap().expected_std.last().unwrap()[0];
-        });
-        out
+            let told = episode_information(problem, &settings, &OFFSET, &PUSHED, actions);
+            told.unwrap().expected_std.last().unwrap()[0]
+        })
     };
     let every = std(&[("tracker_rate", 50.0)]);
     let fifth = std(&[("tracker_rate", 10.0)]);

@@ -109,16 +109,11 @@ fn correlated(parameters: &[Parameter], none: &Explanation) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use asid_core::parameter::Scale;
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::fit::StartSlopes;
-    use crate::linearise::Unknown;
     use crate::normal::{inverse, left_out};
-    use crate::predict::Point;
 
     fn parameter(name: &str) -> Parameter {
         Parameter {
@@ -133,29 +128,12 @@ mod tests {
     /// An explanation without effects, fitted to logs with some information on parameters whose
     /// ranges are of length 1.
     fn explanation(parameters: &[Parameter], information: &DMatrix<f64>) -> Explanation {
-        let n = parameters.len();
-        Explanation {
-            effects: Vec::new(),
-            is_tolerance: Vec::new(),
-            unknowns: parameters.iter().cloned().map(Unknown::free).collect(),
-            fit: Fit {
-                point: Point {
-                    theta: vec![0.5; n],
-                    starts: Vec::new(),
-                },
-                cost: 0.0,
-                residuals: Vec::new(),
-                shows: (0..n).map(|k| information[(k, k)].sqrt()).collect(),
-                gains: DMatrix::zeros(n, 0),
-                covariance: inverse(information, 1e-14),
-                unresolved: left_out(information, 1e-14),
-                free: (0..n).collect(),
-                starts: Arc::new(StartSlopes::default()),
-            },
-            held_out: 0.0,
-            held_starts: Vec::new(),
-            local: vec![None; n],
-        }
+        let covariance = inverse(information, 1e-14);
+        let mut explanation = Explanation::of_parameters(parameters, covariance, 0);
+        let shows = information.diagonal().map(f64::sqrt);
+        explanation.fit.shows = shows.as_slice().to_vec();
+        explanation.fit.unresolved = left_out(information, 1e-14);
+        explanation
     }
 
     /// Symptom: of a cart with `m a = g u`, the logs were said to determine every combination of

@@ -135,49 +135,24 @@ fn beyond(difference: &DVector<f64>, columns: &[DVector<f64>]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use asid_core::Parameter;
     use asid_core::parameter::Scale;
 
     use super::*;
-    use crate::fit::{Fit, StartSlopes};
-    use crate::linearise::Unknown;
 
     /// An explanation with values at 0 and ranges from -9 to 9, whose fit leaves a sum of squares.
     fn explanation(covariance: DMatrix<f64>, cost: f64) -> Explanation {
-        let n = covariance.nrows();
-        let unknown = |i: usize| {
-            Unknown::free(Parameter {
-                name: format!("value {i}"),
-                targets: Vec::new(),
-                range: [-9.0, 9.0],
-                scale: Scale::Linear,
-                unit: String::new(),
-            })
+        let parameter = |i: usize| Parameter {
+            name: format!("value {i}"),
+            targets: Vec::new(),
+            range: [-9.0, 9.0],
+            scale: Scale::Linear,
+            unit: String::new(),
         };
-        Explanation {
-            effects: Vec::new(),
-            is_tolerance: Vec::new(),
-            unknowns: (0..n).map(unknown).collect(),
-            fit: Fit {
-                point: Point {
-                    theta: vec![0.0; n],
-                    starts: Vec::new(),
-                },
-                cost,
-                residuals: vec![0.0; 100],
-                shows: vec![1.0; n],
-                gains: DMatrix::zeros(n, 100),
-                covariance,
-                unresolved: vec![false; n],
-                free: (0..n).collect(),
-                starts: Arc::new(StartSlopes::default()),
-            },
-            held_out: 0.0,
-            held_starts: Vec::new(),
-            local: vec![None; n],
-        }
+        let parameters: Vec<Parameter> = (0..covariance.nrows()).map(parameter).collect();
+        let mut explanation = Explanation::of_parameters(&parameters, covariance, 100);
+        explanation.fit.cost = cost;
+        explanation
     }
 
     /// Symptom: with a value that no reading shows, such as an axis that a sensor does not have,
