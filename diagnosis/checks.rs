@@ -5,8 +5,8 @@ mod missing;
 mod missing_force;
 mod units;
 
-use asid_core::{Result, Scene};
-use asid_mjcf::memory::own_memory;
+use asid_core::Result;
+use asid_mjcf::memory::{OwnMemory, own_memory};
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
@@ -86,20 +86,22 @@ pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
     )
 }
 
-/// Checks whether the model's own actuators and sensors have filters or delays.
+/// Checks whether the filters and delays that the model's own actuators and sensors have are kept.
 ///
-/// The smoother places the machine at each row, and the engine forgets such a state there. Effects
-/// keep theirs.
+/// The smoother places the machine at each row. What a sensor remembers is lost there, and what an
+/// actuator remembers is lost on some engines. Effects keep theirs.
 #[must_use]
-pub fn memory(scene: &Scene) -> Option<CheckResult> {
-    let found = own_memory(scene.xml());
-    (!found.is_empty()).then(|| {
+pub fn memory(machine: &Machine) -> Option<CheckResult> {
+    let is_lost = |m: &OwnMemory| m.of_sensor || !machine.remembers_commands();
+    let own = own_memory(machine.scene.xml()).into_iter();
+    let lost: Vec<String> = own.filter(is_lost).map(|m| m.what).collect();
+    (!lost.is_empty()).then(|| {
         check(
             "memory",
             false,
             format!(
-                "the model itself has a filter or a delay, which is forgotten at each row of the logs: {}; take it out of the model and give it as an effect of a refined model (`asid list` has lags, filters and delays of drives and sensors)",
-                found.join(", ")
+                "the model itself has a filter or a delay, which this engine forgets at each row of the logs: {}; take it out of the model and give it as an effect of a refined model (`asid list` has lags, filters and delays of drives and sensors)",
+                lost.join(", ")
             ),
         )
     })

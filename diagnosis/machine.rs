@@ -28,6 +28,12 @@ pub struct Machine {
 }
 
 impl Machine {
+    /// Whether the model's own actuators remember commands, and the engine keeps that.
+    #[must_use]
+    pub fn remembers_commands(&self) -> bool {
+        self.model.remembers_commands()
+    }
+
     /// Compiles a scene.
     ///
     /// # Errors

@@ -193,6 +193,10 @@ impl Model for Refined {
         self.inner.engine()
     }
 
+    fn remembers_commands(&self) -> bool {
+        self.inner.remembers_commands()
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         if self.is_episode(target) {
             return Ok(0.0);

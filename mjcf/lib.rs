@@ -9,6 +9,7 @@
 //! that preserves all other text.
 
 pub mod cartesian;
+mod classes;
 pub mod document;
 pub mod kinematics;
 pub mod markup;

@@ -87,6 +87,13 @@ pub trait Model: Send + Sync {
         String::new()
     }
 
+    /// Whether actuators have a filter, a delay or another state that [`Simulator::displace`] keeps.
+    ///
+    /// False by default: the memory of a scene that has one is then lost where its state is set.
+    fn remembers_commands(&self) -> bool {
+        false
+    }
+
     /// Value of a target in the unchanged scene.
     ///
     /// # Errors

@@ -269,6 +269,18 @@ pub trait Simulator: Send {
     /// When a length does not fit or a value is not finite.
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()>;
 
+    /// Sets positions and velocities within an episode: what actuators remember of earlier commands
+    /// stays, such as the state of a filter.
+    ///
+    /// By default it is [`Simulator::set_state`], which is right for models that do not
+    /// [remember commands](crate::Model::remembers_commands).
+    ///
+    /// # Errors
+    /// As [`Simulator::set_state`].
+    fn displace(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        self.set_state(sims, qpos, qvel)
+    }
+
     /// Runs a rollout and writes `sims x frames x record.width()` readings.
     ///
     /// Rows of a diverged simulation are NaN from that frame on.

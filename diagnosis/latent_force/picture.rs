@@ -264,7 +264,8 @@ pub(super) fn series(
         }),
         position: (dof.position).map_or_else(Vec::new, |p| along(&|w, k| state(w, k)[p])),
         speed: along(&|w, k| state(w, k)[nq + d]),
-        load: if drives.is_empty() {
+        // The force of a drive with a filter or a delay does not follow from the present command.
+        load: if drives.is_empty() || !drives.iter().all(|(_, d)| d.is_memoryless()) {
             Vec::new()
         } else {
             along(&load)

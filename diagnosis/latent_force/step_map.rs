@@ -59,8 +59,8 @@ struct Common<'a> {
     readings: Recording,
     /// Largest number of roles in one pass.
     capacity: usize,
-    /// Whether an effect may depend on time or on earlier states: one on commands, forces or
-    /// readings.
+    /// Whether a step may depend on time or on earlier states: by an effect on commands, forces or
+    /// readings, or by what the model's own actuators remember.
     depends_on_past: bool,
     /// Whether an effect makes readings depend on earlier ones.
     remembers_readings: bool,
@@ -215,7 +215,7 @@ impl<'a> StepMap<'a> {
             })
             .collect::<Result<_>>()?;
         let names = layout.state_channels();
-        let (mut depends_on_past, mut remembers_readings) = (false, false);
+        let (mut depends_on_past, mut remembers_readings) = (model.remembers_commands(), false);
         let (mut in_each_step, mut on_readings) = (Vec::new(), Vec::new());
         for spec in machine.given_effects().iter().chain(specs) {
             let effect = spec.find(&machine.plant)?;

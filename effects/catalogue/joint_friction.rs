@@ -406,7 +406,10 @@ impl Effect for Load {
     fn sites(&self, plant: &Plant) -> Vec<String> {
         let joints = plant.scalar_joints();
         joints
-            .filter(|&j| plant.drives_of(j).next().is_some())
+            .filter(|&j| {
+                let mut drives = plant.drives_of(j).peekable();
+                drives.peek().is_some() && drives.all(|(_, drive)| drive.is_memoryless())
+            })
             .map(|j| plant.layout.joints[j].name.clone())
             .collect()
     }

@@ -95,11 +95,11 @@ fn actuators(plant: &Plant) -> Vec<String> {
     actuators.map(|a| a.name.clone()).collect()
 }
 
-/// Names of the actuators that are plain drives of a joint.
+/// Names of the actuators that drive a joint by the present command, position and speed alone.
 fn drives(plant: &Plant) -> Vec<String> {
     let actuators = plant.layout.actuators.iter().zip(&plant.drives);
     actuators
-        .filter(|(_, drive)| drive.is_some())
+        .filter(|(_, drive)| drive.is_some_and(|d| d.is_memoryless()))
         .map(|(actuator, _)| actuator.name.clone())
         .collect()
 }

@@ -25,7 +25,8 @@ pub fn sites(plant: &Plant) -> Vec<String> {
             let mut drives = plant.drives_of(j);
             match (drives.next(), drives.next()) {
                 (Some((_, drive)), None) => {
-                    drive.law != DriveLaw::Motor || plant.joints[j].armature > 0.0
+                    drive.is_memoryless()
+                        && (drive.law != DriveLaw::Motor || plant.joints[j].armature > 0.0)
                 }
                 _ => false,
             }

@@ -151,6 +151,35 @@ impl RefinedSimulator {
         Ok(())
     }
 
+    /// Places the engine's simulations by `put` at positions and velocities, and tells the effects.
+    fn put(
+        &mut self,
+        sims: &[usize],
+        qpos: &[f64],
+        qvel: &[f64],
+        put: impl Fn(&mut dyn Simulator) -> Result<()>,
+    ) -> Result<()> {
+        let busy = |s: &usize| lock(&self.rows[*s]).iter().any(Option::is_some);
+        if !self.placed.iter().any(|p| p.effect.steps()) || !sims.iter().any(busy) {
+            return put(&mut *self.inner);
+        }
+        let (nq, nv) = (self.layout().nq, self.layout().nv);
+        self.before.resize(sims.len() * (nq + nv), 0.0);
+        self.inner.read(sims, &self.state, &mut self.before)?;
+        put(&mut *self.inner)?;
+        let to = qpos
+            .chunks_exact(nq.max(1))
+            .zip(qvel.chunks_exact(nv.max(1)));
+        let before = self.before.chunks_exact((nq + nv).max(1));
+        for ((&sim, from), (q, v)) in sims.iter().zip(before).zip(to) {
+            let (from_q, from_v) = from.split_at(nq);
+            for acting in lock(&self.rows[sim]).iter_mut().flatten() {
+                acting.displaced([from_q, from_v], [q, v]);
+            }
+        }
+        Ok(())
+    }
+
     /// Applies the effects on sensors to rows of a simulation's readings.
     ///
     /// The first row is `first` physics steps after the beginning of its episode, and each further
@@ -285,25 +314,11 @@ impl Simulator for RefinedSimulator {
     }
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
-        let busy = |s: &usize| lock(&self.rows[*s]).iter().any(Option::is_some);
-        if !self.placed.iter().any(|p| p.effect.steps()) || !sims.iter().any(busy) {
-            return self.inner.set_state(sims, qpos, qvel);
-        }
-        let (nq, nv) = (self.layout().nq, self.layout().nv);
-        self.before.resize(sims.len() * (nq + nv), 0.0);
-        self.inner.read(sims, &self.state, &mut self.before)?;
-        self.inner.set_state(sims, qpos, qvel)?;
-        let to = qpos
-            .chunks_exact(nq.max(1))
-            .zip(qvel.chunks_exact(nv.max(1)));
-        let before = self.before.chunks_exact((nq + nv).max(1));
-        for ((&sim, from), (q, v)) in sims.iter().zip(before).zip(to) {
-            let (from_q, from_v) = from.split_at(nq);
-            for acting in lock(&self.rows[sim]).iter_mut().flatten() {
-                acting.displaced([from_q, from_v], [q, v]);
-            }
-        }
-        Ok(())
+        self.put(sims, qpos, qvel, |inner| inner.set_state(sims, qpos, qvel))
+    }
+
+    fn displace(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        self.put(sims, qpos, qvel, |inner| inner.displace(sims, qpos, qvel))
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {

@@ -12,6 +12,7 @@ use roxmltree::Node;
 use super::elements::HISTORY_MARGIN;
 use super::{NativeActuator, Writer};
 use crate::markup::numbers;
+use crate::memory::{self, time_constant};
 use crate::plant::DriveLaw;
 
 /// Attributes of short forms that `<general>` does not have.
@@ -189,23 +190,17 @@ impl Writer<'_, '_> {
 
     /// The filter that the document gives an actuator: its `dyntype`, and `dynprm` if it is said.
     fn filter(&self, node: Node<'_, '_>) -> Option<(String, Option<String>)> {
-        // The other short forms have none.
-        if !matches!(node.tag_name().name(), "position" | "general") {
-            return None;
-        }
-        let kind = self.elements.said(node, |n| match lag(n) {
-            Some(lag) => Some(if lag > 0.0 { "filterexact" } else { "none" }.to_owned()),
-            None => n.attribute("dyntype").map(str::to_owned),
-        });
-        let kind = kind.filter(|kind| kind != "none")?;
-        let numbers = self.elements.said(node, |n| match lag(n) {
+        let kind = memory::filter(self.elements.root, node)?;
+        let numbers = self.elements.said(node, |n| match time_constant(n) {
             Some(lag) if lag > 0.0 => Some(numbers(&[lag])),
             _ => n.attribute("dynprm").map(str::to_owned),
         });
         Some((kind, numbers))
     }
 
+    /// Writes a delay in addition to the document's own.
     fn write_delay(&mut self, node: Node<'_, '_>, delay: f64) {
+        let delay = memory::delay(self.elements.root, node) + delay;
         let samples = (delay / self.native.plant.layout.timestep).ceil() + HISTORY_MARGIN;
         self.markup.set_numbers(node, "delay", &[delay]);
         self.markup.set_numbers(node, "nsample", &[samples]);
@@ -219,11 +214,6 @@ impl Writer<'_, '_> {
         self.markup.set_numbers(node, "forcerange", &range);
         self.markup.set(node, "forcelimited", "true");
     }
-}
-
-/// Time constant of the lag of a servo in its short form, s; `None` where it says none.
-fn lag(node: Node<'_, '_>) -> Option<f64> {
-    node.attribute("timeconst")?.trim().parse().ok()
 }
 
 /// Whether an actuator, or a class's, takes its damping from a ratio; `None` if it does not say.

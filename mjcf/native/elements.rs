@@ -1,5 +1,6 @@
 //! The elements of a document, in the order of the layout.
 
+use crate::classes;
 use asid_core::Scene;
 use asid_core::error::{Error, Result};
 use asid_core::layout::Layout;
@@ -132,24 +133,9 @@ impl<'d> Elements<'d> {
         all.any(|n| n.has_tag_name(tag) && n.has_attribute(attribute))
     }
 
-    /// What an element, else its default class, else a class around that, says.
-    ///
-    /// `of` reads the element, and the elements of a class, of which the last that says it counts.
+    /// What an element or a default class of it says ([`classes::said`]).
     pub fn said<T>(&self, node: Node<'_, '_>, of: impl Fn(Node<'_, '_>) -> Option<T>) -> Option<T> {
-        if let Some(own) = of(node) {
-            return Some(own);
-        }
-        let sections = self.root.children().filter(|n| n.has_tag_name("default"));
-        let sections: Vec<Node<'d, 'd>> = sections.collect();
-        let named = node.attribute("class").and_then(|class| {
-            let mut all = sections.iter().flat_map(|s| s.descendants());
-            all.find(|n| n.has_tag_name("default") && n.attribute("class") == Some(class))
-        });
-        let around = named.into_iter().flat_map(|n| n.ancestors());
-        let around = around.filter(|n| n.has_tag_name("default"));
-        // Elements directly in a section are of the class of all.
-        let mut classes = around.chain(sections.iter().copied());
-        classes.find_map(|class| class.children().rev().find_map(&of))
+        classes::said(self.root, node, of)
     }
 
     /// Unit of the document's angles per rad: 1, or 180/π where the document uses degrees.

@@ -22,6 +22,7 @@ use roxmltree::{Document, Node};
 
 use crate::Plant;
 use crate::markup::Markup;
+use crate::memory;
 pub use assets::way;
 use elements::Elements;
 
@@ -298,6 +299,7 @@ impl Writer<'_, '_> {
         let timestep = self.native.plant.layout.timestep;
         for (&i, &delay) in &self.native.sensor_delays {
             let node = self.elements.sensors[i];
+            let delay = memory::delay(self.elements.root, node) + delay;
             self.markup.set_numbers(node, "delay", &[delay]);
             let samples = (delay / timestep).ceil() + elements::HISTORY_MARGIN;
             self.markup.set_numbers(node, "nsample", &[samples]);

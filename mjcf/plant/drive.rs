@@ -34,6 +34,9 @@ pub struct Drive {
     pub ctrl_range: Option<[f64; 2]>,
     /// Limits of the force, before the gear.
     pub force_range: Option<[f64; 2]>,
+    /// Whether the document gives it a filter or a delay: its force then follows from earlier
+    /// commands too, which [`Drive::force`] does not know.
+    pub remembers: bool,
 }
 
 impl Drive {
@@ -85,6 +88,12 @@ impl Drive {
         self
     }
 
+    /// Whether its force follows from the present command, position and speed alone.
+    #[must_use]
+    pub fn is_memoryless(&self) -> bool {
+        !self.remembers
+    }
+
     /// Whether it is a position servo.
     #[must_use]
     pub fn is_position_servo(&self) -> bool {
@@ -107,7 +116,8 @@ fn within(x: f64, range: Option<[f64; 2]>) -> f64 {
 /// The law of an actuator, and the factor of its gain in the gear; `None` for other laws.
 ///
 /// MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms. Its
-/// force is `gain u + b0 + b1 q + b2 v`. A `<general>` one without a state is
+/// force is `gain u + b0 + b1 q + b2 v`, with `u` the command or what its filter makes of it. A
+/// `<general>` one with no other state is
 ///
 /// - a motor where the bias is none,
 /// - a position servo where `b1 = -gain` and `b0 = 0`, with `kp = gain` and `kv = -b2`,
@@ -133,7 +143,9 @@ pub(super) fn law(actuator: &Actuator) -> Option<(DriveLaw, f64)> {
         ActuatorKind::Velocity => speed(actuator.kv.unwrap_or(gain)),
         ActuatorKind::General => {
             let plain = is(&actuator.gain_type, "fixed", true)
-                && is(&actuator.dyn_type, "none", true)
+                && ["none", "filter", "filterexact"]
+                    .iter()
+                    .any(|kind| is(&actuator.dyn_type, kind, *kind == "none"))
                 && gain != 0.0;
             let affine = is(&actuator.bias_type, "affine", false);
             if !plain || !(affine || is(&actuator.bias_type, "none", true)) {

@@ -7,6 +7,7 @@ use super::drive::{Drive, law};
 use super::sensor::reads;
 use super::{Plant, PlantBody, PlantGeom, PlantJoint};
 use crate::document;
+use crate::memory;
 use crate::mass::{GeomMass, MassProperties};
 use asid_core::error::Result;
 use asid_core::layout::{JointKind, Layout};
@@ -68,11 +69,18 @@ impl Plant {
                 weld,
             });
         }
+        // Actuators that are attached from another document come after those of this one.
+        let remember = memory::of_actuators(scene.xml()).into_iter();
+        let remember = remember.chain(std::iter::repeat(false));
         let drives = model
             .actuators
             .iter()
             .zip(&layout.actuators)
-            .map(|(a, place)| drive(&model, &layout, a, place.ctrl_range))
+            .zip(remember)
+            .map(|((a, place), remembers)| {
+                let drive = drive(&model, &layout, a, place.ctrl_range)?;
+                Some(Drive { remembers, ..drive })
+            })
             .collect();
         let sensors = model
             .sensors
@@ -145,6 +153,7 @@ fn drive(
             let [a, b] = range.map(|force| force / gain);
             [a.min(b), a.max(b)]
         }),
+        remembers: false,
     })
 }
 

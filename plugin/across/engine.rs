@@ -44,6 +44,10 @@ where
         self.run(|model| model.engine())
     }
 
+    fn remembers_commands(&self) -> bool {
+        self.run(|model| model.remembers_commands())
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         self.try_run(|model| model.nominal(target))
     }
@@ -73,6 +77,10 @@ impl Simulator for Across<Box<dyn Simulator>> {
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
         self.try_run_mut(|simulator| simulator.set_state(sims, qpos, qvel))
+    }
+
+    fn displace(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        self.try_run_mut(|simulator| simulator.displace(sims, qpos, qvel))
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {

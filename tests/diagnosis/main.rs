@@ -22,6 +22,8 @@ mod next;
 mod no_wiring;
 mod one_joint;
 mod ordinary;
+#[cfg(feature = "mujoco")]
+mod own_memory;
 mod played;
 mod raised_tracker;
 mod roll;

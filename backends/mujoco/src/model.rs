@@ -52,6 +52,12 @@ impl Model for MujocoModel {
         format!("mujoco {}", crate::VERSION)
     }
 
+    fn remembers_commands(&self) -> bool {
+        let model = &self.compiled.model;
+        let buffers = model.actuator_historyadr();
+        model.na() > 0 || buffers.iter().any(|at| *at >= 0)
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         Ok(Column::resolve(&self.compiled, target)?.nominal)
     }

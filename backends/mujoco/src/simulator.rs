@@ -81,7 +81,7 @@ impl MujocoSimulator {
         }
         batch.reset(&all, !layout.keyframes.is_empty());
         let fresh = batch.state(0).to_vec();
-        let [act, history, _] = states.memory.each_ref().map(|part| part.start);
+        let (act, history) = (states.act.start, states.history.start);
         let memory = CommandMemory::of(&compiled.model, act, history, &fresh);
         let values = std::iter::repeat_with(|| plan.nominal())
             .take(size)
@@ -103,6 +103,36 @@ impl MujocoSimulator {
             plan,
             compiled,
         })
+    }
+
+    /// Sets positions and velocities; memory of commands and readings stays.
+    fn put(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        check_sims(sims, self.batch_size())?;
+        let (nq, nv) = (self.compiled.layout.nq, self.compiled.layout.nv);
+        check_state(&self.compiled.layout, sims.len(), qpos, qvel)?;
+        let norm = |row: &[f64], at: usize| {
+            let q = &row[at..at + 4];
+            q.iter().map(|x| x * x).sum::<f64>().sqrt()
+        };
+        for row in qpos.chunks_exact(nq.max(1)) {
+            if self.quaternions.iter().any(|&at| norm(row, at) < 1e-9) {
+                return Err(Error::Shape("a quaternion of the state is zero".into()));
+            }
+        }
+        for (i, &sim) in sims.iter().enumerate() {
+            let row = self.batch.state(sim);
+            let positions = &mut row[self.states.qpos.clone()];
+            positions.copy_from_slice(&qpos[i * nq..(i + 1) * nq]);
+            for &at in &self.quaternions {
+                let length = norm(positions, at);
+                positions[at..at + 4].iter_mut().for_each(|x| *x /= length);
+            }
+            row[self.states.qvel.clone()].copy_from_slice(&qvel[i * nv..(i + 1) * nv]);
+            // The solver begins as after a reset, wherever it ended.
+            let solver = self.states.solver.clone();
+            row[solver.clone()].copy_from_slice(&self.fresh[solver]);
+        }
+        Ok(())
     }
 
     fn running(&self, sims: &[usize]) -> Vec<usize> {
@@ -145,34 +175,19 @@ impl Simulator for MujocoSimulator {
     }
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
-        check_sims(sims, self.batch_size())?;
-        let (nq, nv) = (self.compiled.layout.nq, self.compiled.layout.nv);
-        check_state(&self.compiled.layout, sims.len(), qpos, qvel)?;
-        let norm = |row: &[f64], at: usize| {
-            let q = &row[at..at + 4];
-            q.iter().map(|x| x * x).sum::<f64>().sqrt()
-        };
-        for row in qpos.chunks_exact(nq.max(1)) {
-            if self.quaternions.iter().any(|&at| norm(row, at) < 1e-9) {
-                return Err(Error::Shape("a quaternion of the state is zero".into()));
-            }
-        }
-        for (i, &sim) in sims.iter().enumerate() {
+        self.put(sims, qpos, qvel)?;
+        for &sim in sims {
             let row = self.batch.state(sim);
-            let positions = &mut row[self.states.qpos.clone()];
-            positions.copy_from_slice(&qpos[i * nq..(i + 1) * nq]);
-            for &at in &self.quaternions {
-                let length = norm(positions, at);
-                positions[at..at + 4].iter_mut().for_each(|x| *x /= length);
-            }
-            row[self.states.qvel.clone()].copy_from_slice(&qvel[i * nv..(i + 1) * nv]);
-            // Nothing else remembers the previous state.
-            for part in &self.states.memory {
+            for part in [&self.states.act, &self.states.history] {
                 row[part.clone()].copy_from_slice(&self.fresh[part.clone()]);
             }
             self.begun[sim] = true;
         }
         Ok(())
+    }
+
+    fn displace(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        self.put(sims, qpos, qvel)
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {

@@ -21,9 +21,12 @@ pub struct StateLayout {
     pub qpos: Range<usize>,
     /// Velocities.
     pub qvel: Range<usize>,
-    /// Remaining memory of the past: activations, delay buffers of actuators and sensors, and the
-    /// solver's starting point.
-    pub memory: [Range<usize>; 3],
+    /// Activations of actuators.
+    pub act: Range<usize>,
+    /// Delay buffers of actuators and sensors.
+    pub history: Range<usize>,
+    /// The solver's starting point.
+    pub solver: Range<usize>,
 }
 
 impl StateLayout {
@@ -34,11 +37,9 @@ impl StateLayout {
             time: part(mjtState::mjSTATE_TIME),
             qpos: part(mjtState::mjSTATE_QPOS),
             qvel: part(mjtState::mjSTATE_QVEL),
-            memory: [
-                part(mjtState::mjSTATE_ACT),
-                part(mjtState::mjSTATE_HISTORY),
-                part(mjtState::mjSTATE_WARMSTART),
-            ],
+            act: part(mjtState::mjSTATE_ACT),
+            history: part(mjtState::mjSTATE_HISTORY),
+            solver: part(mjtState::mjSTATE_WARMSTART),
         }
     }
 }

@@ -232,6 +232,6 @@ impl Part {
         }
         // A simulation that failed at the row before is reset.
         self.begin_anew(c, &row.sims, k)?;
-        self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
+        self.simulator.displace(&row.sims, &row.qpos, &row.qvel)
     }
 }

@@ -221,7 +221,7 @@ impl Part {
         let nominal = now.repeat(which.len());
         self.simulator.copy_state(&nominal, &row.sims)?;
         self.begin_anew(c, &row.sims, k)?;
-        self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
+        self.simulator.displace(&row.sims, &row.qpos, &row.qvel)
     }
 
     /// Resets simulations, with the time of row `k` of their walks: effects that grow with time
