@@ -13,7 +13,7 @@ mod sensor;
 use asid_core::error::{Error, Result};
 use asid_core::layout::{JointKind, Layout};
 
-pub use drive::{Drive, DriveLaw};
+pub use drive::{Drive, DriveLaw, law};
 
 /// A body.
 #[derive(Clone, Debug, PartialEq)]

@@ -124,8 +124,10 @@ fn within(x: f64, range: Option<[f64; 2]>) -> f64 {
 /// - a velocity servo where `b2 = -gain` and `b0 = b1 = 0`, with `kv = gain`,
 ///
 /// and no plain drive otherwise. A servo without gain is no plain drive either. A default class for
-/// `<general>` may set what a short form leaves out.
-pub(super) fn law(actuator: &Actuator) -> Option<(DriveLaw, f64)> {
+/// `<general>` may set what a short form leaves out. `None` too where the actuator remembers more
+/// than a first-order filter of its command.
+#[must_use]
+pub fn law(actuator: &Actuator) -> Option<(DriveLaw, f64)> {
     let gain = actuator.gainprm.first().copied().unwrap_or(1.0);
     let bias: [f64; 3] = std::array::from_fn(|i| actuator.biasprm.get(i).copied().unwrap_or(0.0));
     // A positive `b2` is a damping ratio: the engine computes the gain, and effects read it there.

@@ -3,8 +3,10 @@
 use asid_core::layout::Layout;
 use asid_core::{Result, Scene};
 use asid_mjcf::mass::GeomMass;
+use asid_mjcf::plant::{DriveLaw, law};
 use mjcf_rs::Model;
 use mjcf_rs::equality::Equality;
+use mjcf_rs::extras::ActuatorKind;
 use rapier3d::dynamics::RigidBodyBuilder;
 use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
 use rapier3d_mjcf::{MjcfBody, MjcfRobot};
@@ -99,8 +101,15 @@ pub fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
         let limited = actuator
             .force_limited
             .resolve(model.compiler.autolimits, actuator.force_range.is_some());
+        // Other laws are refused before.
+        let (law, gain) = law(actuator).unwrap_or((DriveLaw::Motor, 1.0));
         slots.push(ActuatorSlot {
-            kind: actuator.kind,
+            kind: match law {
+                DriveLaw::Motor => ActuatorKind::Motor,
+                DriveLaw::Position { .. } => ActuatorKind::Position,
+                DriveLaw::Velocity { .. } => ActuatorKind::Velocity,
+            },
+            gain,
             joint: layout
                 .joints
                 .iter()

@@ -67,7 +67,7 @@ fn actuator(slot: &ActuatorSlot, values: &ActuatorValues, ctrl: f64) -> Linear {
             ..Linear::default()
         },
         _ => Linear {
-            constant: g * ctrl,
+            constant: slot.gain * g * ctrl,
             ..Linear::default()
         },
     }

@@ -8,6 +8,7 @@
 use std::collections::HashSet;
 
 use asid_core::{Error, Result, Scene};
+use asid_mjcf::plant::law;
 use mjcf_rs::Model;
 use mjcf_rs::body::{GeomType, JointType};
 use mjcf_rs::equality::Equality;
@@ -15,7 +16,7 @@ use mjcf_rs::extras::ActuatorKind;
 use roxmltree::Node;
 
 /// Elements that change the physics and that this backend lacks.
-const ELEMENTS: [&str; 14] = [
+const ELEMENTS: [&str; 13] = [
     "tendon",
     "flex",
     "flexcomp",
@@ -28,18 +29,19 @@ const ELEMENTS: [&str; 14] = [
     "damper",
     "intvelocity",
     "dcmotor",
-    "general",
     "replicate",
 ];
 
 /// Attributes that change the physics and that this backend or its loader lacks.
-const ATTRIBUTES: [(&str, &str); 17] = [
+const ATTRIBUTES: [(&str, &str); 19] = [
     ("position", "dampratio"),
     ("position", "timeconst"),
     ("position", "inheritrange"),
     ("position", "delay"),
     ("velocity", "delay"),
     ("motor", "delay"),
+    ("general", "delay"),
+    ("general", "dyntype"),
     ("motor", "dyntype"),
     ("joint", "actuatorfrcrange"),
     ("joint", "actuatorgravcomp"),
@@ -123,7 +125,7 @@ fn check_document(scene: &Scene) -> Result<()> {
         }
         let in_actuators = node.parent().is_some_and(|p| p.has_tag_name("actuator"));
         // Mesh wrappers and defaults may share a name with an actuator.
-        let ambiguous = ["cylinder", "plugin", "damper", "general", "muscle"].contains(&tag);
+        let ambiguous = ["cylinder", "plugin", "damper", "muscle"].contains(&tag);
         let in_defaults = node.ancestors().any(|a| a.has_tag_name("default"));
         if ELEMENTS.contains(&tag) && !in_defaults && (!ambiguous || in_actuators) {
             return Err(refuse(scene, format!("cannot simulate {}", place(&node))));
@@ -294,14 +296,22 @@ fn check_bodies(scene: &Scene, model: &Model) -> Result<()> {
 fn check_actuators(scene: &Scene, model: &Model) -> Result<()> {
     for (i, actuator) in model.actuators.iter().enumerate() {
         let name = actuator.name.clone().unwrap_or(format!("actuator{i}"));
-        let known = matches!(
+        // A servo without a gain is none, and does nothing.
+        let servo = matches!(
             actuator.kind,
-            ActuatorKind::Motor | ActuatorKind::Position | ActuatorKind::Velocity
+            ActuatorKind::Position | ActuatorKind::Velocity
         );
-        if !known {
+        if !servo && law(actuator).is_none() {
             return Err(refuse(
                 scene,
-                format!("drives only <motor>, <position> and <velocity>, not actuator `{name}`"),
+                format!("drives only motors, position and velocity servos, not actuator `{name}`"),
+            ));
+        }
+        let slope = actuator.biasprm.get(2).is_some_and(|slope| *slope > 0.0);
+        if slope && actuator.kv.is_none() && actuator.kind != ActuatorKind::Motor {
+            return Err(refuse(
+                scene,
+                format!("cannot honour the damping ratio (`biasprm`) of actuator `{name}`"),
             ));
         }
         let Some(joint) = actuator.joint.as_deref() else {

@@ -29,8 +29,10 @@ pub struct JointSlot {
 /// A drive on a hinge or slide.
 #[derive(Clone, Debug)]
 pub struct ActuatorSlot {
-    /// Kind: motor, position or velocity.
+    /// Kind: motor, position or velocity; a `<general>` one has that of the short form it equals.
     pub kind: ActuatorKind,
+    /// Factor of the command of a motor.
+    pub gain: f64,
     /// Index of its joint.
     pub joint: usize,
     /// Limits of the command.

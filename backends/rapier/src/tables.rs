@@ -1,7 +1,7 @@
 //! The parameters of one simulation.
 
+use asid_mjcf::plant::{DriveLaw, law};
 use mjcf_rs::Model;
-use mjcf_rs::extras::ActuatorKind;
 
 use crate::structure::Structure;
 
@@ -65,13 +65,14 @@ impl Tables {
             actuators: model
                 .actuators
                 .iter()
-                .map(|a| ActuatorValues {
-                    kp: a.kp.unwrap_or(1.0),
-                    kv: a.kv.unwrap_or(match a.kind {
-                        ActuatorKind::Velocity => 1.0,
-                        _ => 0.0,
-                    }),
-                    gear: a.gear[0],
+                .map(|a| {
+                    let (kp, kv) = match law(a) {
+                        Some((DriveLaw::Position { kp, kv }, _)) => (kp, kv),
+                        Some((DriveLaw::Velocity { kv }, _)) => (0.0, kv),
+                        Some((DriveLaw::Motor, _)) | None => (0.0, 0.0),
+                    };
+                    let gear = a.gear[0];
+                    ActuatorValues { kp, kv, gear }
                 })
                 .collect(),
             gravity: model.option.gravity,

@@ -127,6 +127,52 @@ fn a_stiff_servo_is_stable_and_exact_at_rest() {
     assert!(rows.iter().all(|r| r[0] < 0.3001), "overshoots");
 }
 
+/// MuJoCo's short forms and their `<general>` equivalents, by themselves and by a class.
+///
+/// Symptom: a `<position>` whose gains a class of `<general>` gives moved with a gain of 1.
+#[test]
+fn a_general_actuator_moves_as_the_short_form_that_it_equals() {
+    let run = |class: &str, actuator: &str| {
+        let inside = format!(
+            r#"<option gravity="0 0 0"/><default>{class}</default>
+            <worldbody><body><joint name="j" axis="0 0 1" damping="0.1"/>
+              <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>
+            <actuator>{actuator}</actuator>"#
+        );
+        Bench::new(&inside, &["qpos.j", "qvel.j"]).run(100, &[0.4])
+    };
+    let servo = r#"gainprm="40" biastype="affine" biasprm="0 -40 -3" forcerange="-9 9""#;
+    let class = format!("<general {servo}/>");
+    for (short, class, general) in [
+        (
+            r#"<position joint="j" kp="40" kv="3" forcerange="-9 9"/>"#,
+            "",
+            &*format!(r#"<general joint="j" {servo}/>"#),
+        ),
+        (
+            r#"<position joint="j" kp="40" kv="3" forcerange="-9 9"/>"#,
+            &class,
+            r#"<position joint="j"/>"#,
+        ),
+        (
+            r#"<velocity joint="j" kv="4"/>"#,
+            "",
+            r#"<general joint="j" gainprm="4" biastype="affine" biasprm="0 0 -4"/>"#,
+        ),
+        (
+            r#"<motor joint="j" gear="-6" forcerange="-0.25 0.05"/>"#,
+            "",
+            r#"<general joint="j" gainprm="3" gear="-2" forcerange="-0.75 0.15"/>"#,
+        ),
+    ] {
+        let (expected, found) = (run("", short), run(class, general));
+        assert!(expected[99][0].abs() > 1e-3, "{short} does not move");
+        for (a, b) in expected.iter().flatten().zip(found.iter().flatten()) {
+            assert!((a - b).abs() < 1e-6, "{general}: {b} where {short} has {a}");
+        }
+    }
+}
+
 #[test]
 fn a_limited_servo_pushes_with_its_limit() {
     let inside = r#"<option gravity="0 0 0"/>

@@ -125,7 +125,9 @@ fn equalities_hold() {
 fn what_it_cannot_simulate_is_refused_by_name() {
     let joint = r#"<body name="b"><joint name="j"/><geom type="sphere" size="1"/></body>"#;
     let cases = [
-        (format!("<worldbody>{joint}</worldbody><actuator><general name=\"g\" joint=\"j\"/></actuator>"), "<general> `g` on line"),
+        (format!("<worldbody>{joint}</worldbody><actuator><general name=\"g\" joint=\"j\" gainprm=\"4\" biastype=\"affine\" biasprm=\"1 -4\"/></actuator>"), "not actuator `g`"),
+        (format!("<worldbody>{joint}</worldbody><actuator><general name=\"g\" joint=\"j\" dyntype=\"filter\"/></actuator>"), "`dyntype` of <general> `g`"),
+        (format!("<default><general gainprm=\"4\" biastype=\"affine\" biasprm=\"0 -4 1\"/></default><worldbody>{joint}</worldbody><actuator><position name=\"p\" joint=\"j\"/></actuator>"), "damping ratio (`biasprm`) of actuator `p`"),
         (format!("<worldbody>{joint}</worldbody><actuator><position name=\"p\" joint=\"j\" kp=\"1\" dampratio=\"1\"/></actuator>"), "`dampratio` of <position> `p`"),
         (format!("<worldbody>{joint}</worldbody><tendon><fixed name=\"t\"><joint joint=\"j\" coef=\"1\"/></fixed></tendon>"), "<tendon>"),
         (format!("<worldbody>{joint}</worldbody><actuator><motor name=\"m\" joint=\"k\"/></actuator>"), "joint `k` of actuator `m`"),

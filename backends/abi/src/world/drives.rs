@@ -1,6 +1,7 @@
 //! Actuators, sensors and keyframes of a document in the header's form.
 
 use asid_core::layout::Layout;
+use asid_mjcf::plant::{DriveLaw, law};
 use mjcf_rs::Model;
 use mjcf_rs::extras::ActuatorKind;
 use roxmltree::{Document, Node};
@@ -50,6 +51,15 @@ pub fn actuators(
         let force_limited = actuator
             .force_limited
             .resolve(model.compiler.autolimits, actuator.force_range.is_some());
+        // A default class for `<general>` may give a servo its gains.
+        let [kp, kv] = match law(actuator) {
+            Some((DriveLaw::Position { kp, kv }, _)) => [kp, kv],
+            Some((DriveLaw::Velocity { kv }, _)) => [0.0, kv],
+            Some((DriveLaw::Motor, _)) => [0.0; 2],
+            // A servo without a gain drives nothing.
+            None => [actuator.kp.unwrap_or(0.0), actuator.kv.unwrap_or(0.0)],
+        };
+        let has = |kinds: &[u32]| f64::from(u8::from(kinds.contains(&kind)));
         drives.push(table::Actuator {
             name: texts.add(&place.name),
             // Actuators attached from another document come after all elements of this one.
@@ -60,15 +70,8 @@ pub fn actuators(
             padding: 0,
             joint,
             gear: actuator.gear[0],
-            kp: match kind {
-                actuator_kind::POSITION => actuator.kp.unwrap_or(1.0),
-                _ => 0.0,
-            },
-            kv: match kind {
-                actuator_kind::POSITION => actuator.kv.unwrap_or(0.0),
-                actuator_kind::VELOCITY => actuator.kv.unwrap_or(1.0),
-                _ => 0.0,
-            },
+            kp: kp * has(&[actuator_kind::POSITION]),
+            kv: kv * has(&[actuator_kind::POSITION, actuator_kind::VELOCITY]),
             ctrl_range: place.ctrl_range.unwrap_or_default(),
             force_range: actuator.force_range.unwrap_or_default(),
         });
