@@ -59,7 +59,7 @@ pub fn actuators(
             // A servo without a gain drives nothing.
             None => [actuator.kp.unwrap_or(0.0), actuator.kv.unwrap_or(0.0)],
         };
-        let has = |kinds: &[u32]| f64::from(u8::from(kinds.contains(&kind)));
+        let has = |kinds: &[i32]| f64::from(u8::from(kinds.contains(&kind)));
         drives.push(table::Actuator {
             name: texts.add(&place.name),
             // Actuators attached from another document come after all elements of this one.
