@@ -5,10 +5,11 @@
 //! measured in units of the limit's own width. A search can then tell which of two motions violates
 //! limits less.
 
+mod unchecked;
+
 use std::collections::BTreeMap;
 
 use asid_core::error::{Error, Result};
-use asid_core::layout::JointKind;
 use asid_mjcf::Plant;
 
 /// Share of a joint's range that is kept free at either end: a real machine may have its stop
@@ -122,30 +123,23 @@ pub struct Limits {
     pub apart: Vec<[usize; 2]>,
     /// Largest speed at the end, rad/s or m/s.
     pub rest: Option<f64>,
+    /// Parts for which a limit without a name does not hold, one sentence for each limit.
+    pub unchecked: Vec<String>,
 }
 
 impl Limits {
     /// Limits of a machine: those requested, and the ranges of its model.
     ///
     /// # Errors
-    /// When a name is unknown, or a low end is not below its high end.
+    /// When a name is unknown or that of a part whose limits cannot be checked, or a low end is not
+    /// below its high end.
     pub fn new(
         plant: &Plant,
         ranges: &dyn Fn(usize) -> Option<[f64; 2]>,
         request: &LimitRequest,
     ) -> Result<Self> {
         let layout = &plant.layout;
-        for name in request
-            .position
-            .keys()
-            .chain(request.speed.keys())
-            .filter(|n| !n.is_empty())
-        {
-            layout.joint(name)?;
-        }
-        for name in request.force.keys().filter(|n| !n.is_empty()) {
-            plant.drive(name)?;
-        }
+        unchecked::check_names(plant, request)?;
         for (name, [low, high]) in &request.position {
             if low >= high {
                 return Err(wrong(
@@ -158,7 +152,7 @@ impl Limits {
             .joints
             .iter()
             .enumerate()
-            .filter(|(_, j)| matches!(j.kind, JointKind::Hinge | JointKind::Slide))
+            .filter(|(_, j)| unchecked::is_checked(j))
             .map(|(i, joint)| {
                 let shrink = |[low, high]: [f64; 2]| {
                     let margin = END_MARGIN * (high - low);
@@ -219,6 +213,7 @@ impl Limits {
             boxes,
             apart: pairs_apart(plant, &may_touch),
             rest: request.rest,
+            unchecked: unchecked::sentences(plant, request),
         })
     }
 }

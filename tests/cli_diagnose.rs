@@ -202,6 +202,61 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     assert!(said.contains("no such file") && status == Some(2), "{said}");
 }
 
+/// Symptom: `--task T --config DIR/config.toml` ran the task in its simulated world and diagnosed
+/// these runs, in place of the logs of the file. Cause: a task on the command line dropped the logs
+/// of the file, also of the same task. Here the logs do not exist, so that a message names the one
+/// that is read first.
+#[test]
+fn logs_of_a_configuration_are_those_of_its_task_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("config.toml");
+    let logs = "task = \"shuffleboard\"\ntrain = [\"a.csv\", \"b.csv\"]\ntest = [\"c.csv\"]\n";
+    std::fs::write(&file, logs).unwrap();
+    let with = |options: &[&str]| {
+        let call = ["diagnose", "--config", text(&file), "--quiet"];
+        let (said, status) = refusal(&[&call[..], options].concat());
+        assert_eq!(status, Some(2), "{said}");
+        said
+    };
+    let task = ["--task", "shuffleboard"];
+    let first = with(&[]);
+    assert!(first.contains("a.csv"), "{first}");
+    assert_eq!(with(&task), first);
+    // Logs of the command line take their place, and so do runs that make them.
+    let said = with(&["--task", "shuffleboard", "--train", "d.csv"]);
+    assert!(said.contains("d.csv"), "{said}");
+    let said = with(&["--task", "shuffleboard", "--runs", "1"]);
+    assert!(said.contains("--runs: at least 2"), "{said}");
+    // Another task has other logs.
+    let said = with(&["--task", "rod-balancing", "--set", "runs=1"]);
+    assert!(said.contains("--runs: at least 2"), "{said}");
+    // Further episodes would be of a simulated machine.
+    let said = with(&["--task", "shuffleboard", "--experiments", "2"]);
+    assert!(said.contains("these logs are given"), "{said}");
+}
+
+/// Symptom: `--world perturbed` and `--preset published` beside a study were accepted and ignored,
+/// and no trial was run for `--world` beside logs of a task. Cause: the kind of world did not count
+/// as a description of a run.
+#[test]
+fn a_kind_of_world_describes_a_run_of_a_task() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    write_study(&study, Truth::None);
+    let world = ["--world", "perturbed"];
+    let (said, status) = refusal(&[&["diagnose", text(&study)][..], &world].concat());
+    assert!(said.contains("cannot be run from here"), "{said}");
+    assert_eq!(status, Some(2), "{said}");
+    let (said, status) = refusal(&["diagnose", text(&study), "--preset", "published"]);
+    assert!(said.contains("--preset: goes with a task"), "{said}");
+    assert_eq!(status, Some(2), "{said}");
+    // Beside logs of a task it is that of the trials, and must be one.
+    let logs = ["diagnose", "--task", "shuffleboard", "--train", "a.csv"];
+    let (said, status) = refusal(&[&logs[..], &["--world", "unheard-of"]].concat());
+    assert!(said.contains("unheard-of"), "{said}");
+    assert_eq!(status, Some(2), "{said}");
+}
+
 /// Rewrites each log of a study.
 fn rewrite_logs(study: &std::path::Path, anew: impl Fn(&str) -> String) {
     for entry in std::fs::read_dir(study).unwrap() {

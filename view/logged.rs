@@ -42,9 +42,14 @@ pub fn positions(
         if !fits {
             continue;
         }
-        for (i, column) in range.enumerate() {
-            let readings: Vec<f64> = (0..log.rows()).map(|k| log.reading(k)[column]).collect();
-            let Some(filled) = filled(&log.time, &readings) else {
+        let column =
+            |c: usize| -> Vec<f64> { (0..log.rows()).map(|k| log.reading(k)[c]).collect() };
+        let mut columns: Vec<Vec<f64>> = range.map(column).collect();
+        if offset == 3 {
+            bring_together(&mut columns);
+        }
+        for (i, readings) in columns.iter().enumerate() {
+            let Some(filled) = filled(&log.time, readings) else {
                 continue;
             };
             read[joint] = true;
@@ -79,6 +84,27 @@ pub fn remark(unread: &[String]) -> Option<String> {
             named.join(", ")
         )
     })
+}
+
+/// Gives each quaternion, of four columns, the sign with which it lies nearer to the one before.
+///
+/// Both signs are the same orientation, but values between two of them are not. A quaternion with a
+/// missing component is missing as a whole.
+fn bring_together(columns: &mut [Vec<f64>]) {
+    let rows = columns.first().map_or(0, Vec::len);
+    let mut before: Option<usize> = None;
+    for k in 0..rows {
+        if columns.iter().any(|c| !c[k].is_finite()) {
+            columns.iter_mut().for_each(|c| c[k] = f64::NAN);
+            continue;
+        }
+        if let Some(before) = before
+            && columns.iter().map(|c| c[before] * c[k]).sum::<f64>() < 0.0
+        {
+            columns.iter_mut().for_each(|c| c[k] = -c[k]);
+        }
+        before = Some(k);
+    }
 }
 
 /// Readings with missing values interpolated, and held before the first and after the last; `None`
@@ -130,5 +156,33 @@ mod tests {
         assert_eq!(unread, ["hidden"]);
         log.readings.fill(nan);
         assert!(positions(&plant, &log, &[9.0; 10]).is_none());
+    }
+
+    /// Symptom: a body that turned half a turn was shown half a turn off between two readings of a
+    /// slow tracker.
+    ///
+    /// Cause: each number of its quaternion was interpolated, across the change of sign of a tracker
+    /// that gives `w >= 0`.
+    #[test]
+    fn an_orientation_is_interpolated_along_the_shorter_way() {
+        let xml = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="1"/></body></worldbody>
+          <sensor><framequat name="q" objtype="xbody" objname="b"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("free", xml, &[]).unwrap()).unwrap();
+        // Turned about z by 178 degrees, then not read, then by 182 degrees.
+        let [w, z] = [89.0_f64.to_radians().cos(), 89.0_f64.to_radians().sin()];
+        let log = Episode {
+            time: vec![0.0, 1.0, 2.0],
+            channels: vec![ChannelColumns {
+                name: "q".into(),
+                len: 4,
+            }],
+            readings: [[w, 0.0, 0.0, z], [f64::NAN; 4], [w, 0.0, 0.0, -z]].concat(),
+            ..Episode::default()
+        };
+        let (qpos, _) = positions(&plant, &log, &[0.0; 21]).unwrap();
+        // Half a turn about z, up to the length of the quaternion.
+        let between = &qpos[7 + 3..7 + 7];
+        assert!(between[0].abs() < 1e-12, "{between:?}");
+        assert!(between[3].abs() > 0.9, "{between:?}");
     }
 }

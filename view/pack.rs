@@ -40,7 +40,7 @@ impl Cube {
             (low, high) = ([0.0; 3], [1.0; 3]);
         }
         // Use the corner as it is written, with fewer digits, so that no point falls outside.
-        let low = low.map(|x| f64::from(x as f32));
+        let low = low.map(below);
         let widest = (0..3).map(|k| high[k] - low[k]).fold(1e-6, f64::max);
         Self {
             low,
@@ -95,6 +95,16 @@ impl Cube {
     }
 }
 
+/// The largest number of single precision that is not above `x`.
+fn below(x: f64) -> f64 {
+    let near = x as f32;
+    f64::from(if f64::from(near) > x {
+        near.next_down()
+    } else {
+        near
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -116,6 +126,40 @@ mod tests {
         }
         for (n, x) in n[3..].iter().zip([turn.w, turn.i, turn.j, turn.k]) {
             assert!((n / TURN - 1.0 - x).abs() <= 0.51 / TURN);
+        }
+    }
+
+    /// Symptom: a machine with one hinge was not drawn, nor some poses of one far from the origin.
+    ///
+    /// Cause: the corner of the cube was rounded to the nearest number of single precision. If that
+    /// is above the lowest point, this point lies outside.
+    #[test]
+    fn the_lowest_point_lies_inside_however_small_and_far_the_cube_is() {
+        let pose = |cube: &Cube, [x, y, z]: [f64; 3]| {
+            let place = Translation3::new(x, y, z);
+            cube.pose(&Isometry3::from_parts(place, UnitQuaternion::identity()))
+        };
+        for p in [[0.0, 0.0, 0.3], [0.05, 0.0, 1.0], [20.1, -30.7, 0.2]] {
+            let cube = Cube::around(std::iter::once(p));
+            assert_ne!(pose(&cube, p)[0], MISSING, "{p:?} in {cube:?}");
+        }
+        // Twenty points over 0.5 m, at many places 50 m away.
+        for place in 0..200 {
+            let at = |k: usize, axis: usize| {
+                let spread = (0.7 * k as f64 + axis as f64).sin();
+                50.0 * (1.3 * f64::from(place) + axis as f64).sin() + 0.25 * spread
+            };
+            let points: Vec<[f64; 3]> =
+                (0..20).map(|k| [0, 1, 2].map(|axis| at(k, axis))).collect();
+            let cube = Cube::around(points.iter().copied());
+            for p in points {
+                let n = pose(&cube, p);
+                assert_ne!(n[0], MISSING, "{p:?} in {cube:?}");
+                for k in 0..3 {
+                    let back = cube.low[k] + f64::from(n[k]) / STEPS * cube.size;
+                    assert!((back - p[k]).abs() <= 0.51 * cube.size / STEPS);
+                }
+            }
         }
     }
 

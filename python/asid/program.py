@@ -8,6 +8,7 @@ line, because it is the command line.
 
 from __future__ import annotations
 
+import json
 import numbers
 import os
 import signal
@@ -58,12 +59,22 @@ def arguments(options: Mapping[str, Option]) -> list[str]:
 
 
 def _text(value: object) -> str:
-    """A value as TOML and the command line write it."""
+    """A value as TOML and the command line write it; a text of its own needs no quotes there."""
+    if hasattr(value, "tolist") and not isinstance(value, numbers.Number):
+        # A truth value or an array of NumPy.
+        value = value.tolist()
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (list, tuple)):
-        return "[" + ",".join(_text(item) for item in value) + "]"
+        return "[" + ",".join(_quoted(item) for item in value) + "]"
     return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
+
+
+def _quoted(item: object) -> str:
+    """An item of a list as TOML writes it; a string of JSON is one of TOML."""
+    if isinstance(item, (str, os.PathLike)):
+        return json.dumps(str(item), ensure_ascii=False)
+    return _text(item)
 
 
 def call(words: Iterable[str | Path], progress: bool = False) -> str:

@@ -178,6 +178,10 @@ class Run(Result):
     task: str
     versions: Versions
     articulation: Articulation | None = None
+    misfit: float | None = None
+    """Root mean square of the residuals at the best fit, in standard deviations of noise and of the simulator's roughness together; missing where the identifier fits nothing to the readings."""
+    residual: float | None = None
+    """Root mean square of the residuals at the best fit, in standard deviations of the noise."""
     unseen: list[Direction] = dataclasses.field(default_factory=list)
 
 
@@ -265,6 +269,8 @@ class Identification(Result):
     task: str
     versions: Versions
     articulation: Articulation | None = None
+    misfit: float | None = None
+    """Root mean square of the residuals at the best fit, in standard deviations of noise and of the simulator's roughness together; missing where the identifier fits nothing to the readings."""
     unseen: list[Direction] = dataclasses.field(default_factory=list)
     """Combinations of unknowns that the logs do not see."""
 

@@ -97,6 +97,13 @@ def test_a_number_of_numpy_is_one_value():
     assert arguments({"seed": np.array([1, 2])}) == ["--seed=1", "--seed=2"]
 
 
+def test_a_list_of_texts_is_one_of_toml():
+    """Symptom: UsageError of ``set={"without": ["gravity-tilt"]}``. Cause: the texts had no quotes."""
+    options = {"set": {"a.b": ["x", 1, [True, 'say "x"']], "c": Path("d/e"), "f": np.bool_(True), "g": np.array([0.5, 1])}}
+    expected = ['a.b=["x",1,[true,"say \\"x\\""]]', "c=d/e", "f=true", "g=[0.5,1.0]"]
+    assert arguments(options) == ["--set=" + text for text in expected]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of Windows end no call")
 def test_an_exception_leaves_no_program_behind(tmp_path, monkeypatch):
     sleeper = tmp_path / "asid"

@@ -28,12 +28,7 @@ pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
              The lines below make the same corrections in the study file.",
         )
         .table(table);
-    let mut shown: Vec<&str> = Vec::new();
-    Some(d.wiring.iter().fold(section, |section, w| {
-        if shown.contains(&&*w.mend) {
-            return section;
-        }
-        shown.push(&w.mend);
-        section.command(w.mend.clone())
-    }))
+    // The lines of a column with two faults are those of the first.
+    let lines = d.wiring.iter().map(|w| &w.mend).filter(|m| !m.is_empty());
+    Some(lines.fold(section, |section, mend| section.command(mend.clone())))
 }

@@ -1,5 +1,7 @@
 //! The final posterior of a parameter, drawn over its prior.
 
+mod binary;
+
 use super::head::{covered, interval, precision};
 use super::posterior::spacing;
 use super::trace::{ParameterReport, Prior};
@@ -17,25 +19,14 @@ pub(super) fn figure(p: &ParameterReport) -> Option<Figure> {
     if let Some(Prior::Binary { probability }) = p.prior {
         return Some(Figure::new(
             title,
-            binary(p, probability)?,
+            binary::bars(p, probability)?,
             "Probability of the values 0 and 1: prior and posterior.",
         ));
     }
     // Everything below uses the axis' own scale: `u` is the logarithm for a parameter drawn on a
     // log axis.
     let axis = Scaled::of(p);
-    let range = range(p).map(|r| r.map(|x| axis.from(x)));
-    let samples: Vec<f64> = p.samples.iter().map(|&x| axis.from(x)).collect();
-    let weighted = Weighted::new(&samples, &p.weights);
-    let domain = domain(p, axis, weighted.as_ref(), range)?;
-    let values: Vec<[f64; 2]> = match &weighted {
-        Some(weighted) => weighted
-            .density(range.unwrap_or([0.0, 0.0]))
-            .points(domain, 240),
-        None => grid(domain, 240)
-            .map(|u| [u, gaussian(u, axis.from(p.estimate), axis.std(p))])
-            .collect(),
-    };
+    let (domain, values) = curve(p, axis)?;
     let points: Vec<[f64; 2]> = values.iter().map(|q| [axis.back(q[0]), q[1]]).collect();
 
     let x_axis = Axis::new(&p.name, &p.unit)
@@ -88,12 +79,30 @@ pub(super) fn figure(p: &ParameterReport) -> Option<Figure> {
                 .label(format!("truth {}", precision(p).show(truth))),
         );
     }
+    let range = range(p).map(|r| r.map(|x| axis.from(x)));
     let caption = caption(p, domain, range);
     Some(Figure::new(
         title,
         chart.description(caption.clone()),
         caption,
     ))
+}
+
+/// The domain of the density, and points of it, both on the axis' scale.
+fn curve(p: &ParameterReport, axis: Scaled) -> Option<([f64; 2], Vec<[f64; 2]>)> {
+    let bounds = bounds(p).map(|r| r.map(|x| axis.from(x)));
+    let samples: Vec<f64> = p.samples.iter().map(|&x| axis.from(x)).collect();
+    let weighted = Weighted::new(&samples, &p.weights);
+    let domain = domain(p, axis, weighted.as_ref(), bounds)?;
+    let points = match &weighted {
+        Some(weighted) => weighted
+            .density(bounds.unwrap_or([0.0, 0.0]))
+            .points(domain, 240),
+        None => grid(domain, 240)
+            .map(|u| [u, gaussian(u, axis.from(p.estimate), axis.std(p))])
+            .collect(),
+    };
+    Some((domain, points))
 }
 
 /// The scale of a parameter's axis.
@@ -106,7 +115,7 @@ impl Scaled {
     fn of(p: &ParameterReport) -> Self {
         let positive = |x: f64| x > 0.0;
         Self {
-            log: p.log_scale && positive(p.estimate) && range(p).is_none_or(|r| positive(r[0])),
+            log: p.log_scale && positive(p.estimate) && bounds(p).is_none_or(|r| positive(r[0])),
         }
     }
 
@@ -163,8 +172,15 @@ fn range(p: &ParameterReport) -> Option<[f64; 2]> {
     (range[0].is_finite() && range[1].is_finite() && range[0] < range[1]).then_some(range)
 }
 
-/// The domain of the density: the prior's range, or a close-up where the posterior fills little of
-/// it.
+/// The range that was searched: that of the prior, and what lies past it where the search went on.
+fn bounds(p: &ParameterReport) -> Option<[f64; 2]> {
+    let [low, high] = range(p)?;
+    let [from, to] = p.searched.unwrap_or([low, high]);
+    Some([low.min(from), high.max(to)])
+}
+
+/// The domain of the density: the range that was searched, or a close-up where the posterior fills
+/// little of it.
 fn domain(
     p: &ParameterReport,
     axis: Scaled,
@@ -193,7 +209,7 @@ fn domain(
             close[0].min(u - 0.15 * reach),
             close[1].max(u + 0.15 * reach),
         ];
-        // Keep a truth outside the prior's range in view.
+        // Keep a truth outside the range in view.
         held = [held[0].min(u), held[1].max(u)];
     }
     match range {
@@ -221,51 +237,6 @@ fn prior_density(prior: &Prior, x: f64) -> f64 {
 
 fn gaussian(x: f64, mean: f64, std: f64) -> f64 {
     (-0.5 * ((x - mean) / std).powi(2)).exp() / (std * (2.0 * std::f64::consts::PI).sqrt())
-}
-
-/// Two pairs of bars for a binary parameter.
-fn binary(p: &ParameterReport, prior: f64) -> Option<Chart> {
-    let after = match Weighted::new(&p.samples, &p.weights) {
-        Some(weighted) => weighted.mean(),
-        None => p.estimate,
-    };
-    if !after.is_finite() {
-        return None;
-    }
-    let pair = |one: f64, x: f64| vec![[x, x + 0.3, 1.0 - one], [1.0 + x, 1.3 + x, one]];
-    let x_axis = Axis::new(&p.name, "")
-        .domain([-0.5, 1.5])
-        .marks(vec![(0.0, "0".to_owned()), (1.0, "1".to_owned())]);
-    let mut chart = Chart::new(
-        &format!("Posterior of {}", p.name),
-        x_axis,
-        Axis::new("probability", "").domain([0.0, 1.0]),
-    )
-    .description(format!(
-        "Probability of 1: {} before, {} after.",
-        decimals(prior, 2),
-        decimals(after, 2)
-    ))
-    .layer(
-        Layer::bars(pair(prior, -0.3))
-            .colour(Colour::Muted)
-            .opacity(0.35)
-            .label("prior"),
-    )
-    .layer(
-        Layer::bars(pair(after, 0.0))
-            .colour(Colour::Blue)
-            .label("posterior"),
-    );
-    if let Some(truth) = p.truth {
-        chart = chart.layer(
-            Layer::vertical(truth)
-                .colour(Colour::Ink)
-                .dashed()
-                .label("truth"),
-        );
-    }
-    Some(chart)
 }
 
 #[cfg(test)]
@@ -296,6 +267,39 @@ mod tests {
         );
         p.std = f64::NAN;
         assert!(domain(&p, Scaled::of(&p), None, range(&p)).is_none());
+    }
+
+    /// Symptom: a flat posterior, or one mirrored into the prior's range, of an unknown that was
+    /// found past that range.
+    ///
+    /// Cause: the density ended at the prior's range, and what lay beyond was reflected inside.
+    #[test]
+    fn a_posterior_past_the_prior_is_drawn_where_it_was_found() {
+        // Quantiles of a normal distribution of mean 1.1 and standard deviation 0.15, as the
+        // inverse of the logistic curve that follows it within 0.01 (Bowling et al. 2009).
+        let samples = (0..1000).map(|k| (f64::from(k) + 0.5) / 1000.0);
+        let p = ParameterReport {
+            estimate: 1.1,
+            std: 0.15,
+            prior: Some(Prior::Uniform {
+                low: 0.0,
+                high: 1.0,
+            }),
+            searched: Some([0.0, 2.0]),
+            samples: samples
+                .map(|u| 1.1 + 0.15 * (u / (1.0 - u)).ln() / 1.702)
+                .collect(),
+            ..ParameterReport::default()
+        };
+        let (_, points) = curve(&p, Scaled::of(&p)).unwrap();
+        let step = points[1][0] - points[0][0];
+        let mass: f64 = points.iter().map(|q| step * q[1]).sum();
+        assert!((mass - 1.0).abs() < 0.01, "{mass}");
+        let peak = points.iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+        assert!((peak[0] - 1.1).abs() < 0.02, "{peak:?}");
+        // It is symmetric about its mean, although the prior ends at 1.
+        let at = |x: f64| points[((x - points[0][0]) / step).round() as usize][1];
+        assert!((at(0.9) / at(1.3) - 1.0).abs() < 0.05);
     }
 
     #[test]

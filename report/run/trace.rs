@@ -169,6 +169,8 @@ pub struct ParameterReport {
     pub interval95: [f64; 2],
     /// The prior.
     pub prior: Option<Prior>,
+    /// The range that was searched in the end, where the search went on past the prior's.
+    pub searched: Option<[f64; 2]>,
     /// Quantiles after each iteration.
     pub narrowing: Vec<Narrowing>,
     /// Samples of the final posterior, at most a few thousand.
@@ -191,6 +193,7 @@ impl Default for ParameterReport {
             std: f64::NAN,
             interval95: [f64::NAN; 2],
             prior: None,
+            searched: None,
             narrowing: Vec::new(),
             samples: Vec::new(),
             weights: Vec::new(),

@@ -89,25 +89,35 @@ pub struct Arguments {
 impl Arguments {
     /// Whether the command line describes runs of a task in a simulated real world.
     fn describes_a_run(&self) -> bool {
-        let real = &self.worlds.real;
         let Algorithms {
             explorer,
             policy,
             identifier,
             solver,
         } = &self.algorithms;
-        !real.truth.is_empty()
-            || !real.real_effect.is_empty()
-            || real.real_backend.is_some()
-            || real.real_model.is_some()
+        self.worlds.real.is_described()
             || policy.is_some()
             || [explorer, identifier, solver].iter().any(|a| a.is_some())
+    }
+
+    /// Whether the logs that a configuration file names are diagnosed.
+    ///
+    /// They are not where the command line names logs, a number of runs that make them, or another
+    /// study or task than the file.
+    fn keeps_logs_of(&self, table: &toml::Table) -> bool {
+        let named = |key: &str| table.get(key).and_then(toml::Value::as_str);
+        let other = match &self.task {
+            Some(task) => named("study").is_some() || named("task").is_some_and(|t| t != task),
+            None => self.study.is_some(),
+        };
+        !other && self.train.is_empty() && self.runs.is_none()
     }
 
     /// Whether the task is run: for its logs, or to try the answer.
     fn runs_task(&self, table: &toml::Table) -> bool {
         let task = self.task.is_some() || (self.study.is_none() && table.contains_key("task"));
-        let logs = !self.train.is_empty() || table.contains_key("train");
+        let given = table.contains_key("train") && self.keeps_logs_of(table);
+        let logs = !self.train.is_empty() || given;
         task && (!logs
             || self.seeds.is_some()
             || self.describes_a_run()

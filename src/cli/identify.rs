@@ -17,15 +17,11 @@ use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{
     CostResult, ParameterResult, SCHEMA, Versions, articulation, articulation_line, caveats,
-    parameter_line,
+    parameter_line, unexplained, widen_by_setting,
 };
 use super::session::Session;
 use super::settings::{Stage, wrong};
 use super::{failure, interrupt, machine, stage, trace, train};
-
-/// Largest residual that chance and a slightly underestimated noise explain, in standard deviations
-/// of the noise.
-pub const UNEXPLAINED: f64 = 1.5;
 
 /// Longest episode relative to the task's; a longer one probably has times in another unit.
 const LONGEST: f64 = 100.0;
@@ -86,6 +82,10 @@ pub struct IdentifyResult {
     articulation: Option<Articulation>,
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     residual: f64,
+    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of the
+    /// simulator's roughness together; missing where the identifier fits nothing to the readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    misfit: Option<f64>,
     /// Start pose of each episode at the best fit.
     starts: Vec<BTreeMap<String, f64>>,
     logs: Vec<String>,
@@ -156,6 +156,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         unseen: found.posterior.unseen.clone(),
         articulation: articulation(&session, &episodes)?,
         residual: found.residual,
+        misfit: found.misfit,
         starts: found
             .starts
             .iter()
@@ -170,7 +171,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         versions: Versions::of(&session),
     };
     let mut lines = lines(&found, result.articulation.as_ref());
-    let caveats = caveats(&session.parameters, &found.posterior);
+    let caveats = caveats(&session.parameters, &found.posterior, widen_by_setting);
     lines.extend(caveats.iter().cloned());
     let names = copies(&arguments.log);
     let mut report = report(&session, &episodes, &found, &names, wall_s)?;
@@ -188,8 +189,8 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         }
         Ok(())
     })?;
-    if found.residual > UNEXPLAINED {
-        failure::warn(&unexplained(found.residual));
+    if let Some(warning) = unexplained(&found) {
+        failure::warn(&warning);
     }
     Ok(())
 }
@@ -217,8 +218,11 @@ fn lines(found: &Identified, articulation: Option<&Articulation>) -> Vec<String>
     let marginals = found.posterior.marginals.iter();
     let mut lines: Vec<String> = marginals.map(parameter_line).collect();
     lines.extend(articulation.map(articulation_line));
+    let together = found.misfit.map_or_else(String::new, |misfit| {
+        format!(", {misfit:.2} times noise and the simulator's roughness together")
+    });
     lines.push(format!(
-        "residual: {:.2} times the sensors' noise",
+        "residual: {:.2} times the sensors' noise{together}",
         found.residual
     ));
     lines
@@ -237,14 +241,6 @@ fn copies(logs: &[PathBuf]) -> Vec<String> {
             .map(|(i, path)| format!("real-{i}.{}", ending(path)))
             .collect(),
     }
-}
-
-fn unexplained(residual: f64) -> String {
-    format!(
-        "the simulator does not explain the logs: at the best fit the readings are off by {residual:.1} times \
-         their noise, and the intervals are widened for it; check the noise, the start of the machine and \
-         whether something else differs from the scene"
-    )
 }
 
 /// Reads a log and checks that it can be used for identification.
@@ -317,9 +313,7 @@ fn report(
             episodes.len()
         ));
     }
-    if found.residual > UNEXPLAINED {
-        report.notes.push(unexplained(found.residual));
-    }
+    report.notes.extend(unexplained(found));
     Ok(report)
 }
 

@@ -47,6 +47,9 @@ pub struct Common {
     /// Seed all random numbers with this
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
+    /// Seed of the real world's machine, where it is another than that of the run.
+    #[arg(skip)]
+    pub machine: Option<u64>,
     /// Use this many threads; results do not depend on it, but where --minutes or --limit ends the
     /// work [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]

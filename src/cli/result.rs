@@ -2,6 +2,7 @@
 
 use crate::pipeline::{EpisodeInformation, RunOutcome};
 use asid_algorithms::identify::articulation::{Articulation, Joint, of_episodes};
+use asid_core::identify::Identified;
 use asid_core::posterior::{Direction, Edge, Marginal};
 use asid_core::{Episode, Parameter, Posterior, Result};
 use serde::Serialize;
@@ -11,6 +12,10 @@ use super::world::RealResult;
 
 /// Layout version of `result.json`.
 pub const SCHEMA: u32 = 1;
+
+/// Largest misfit that chance and a slightly underestimated noise explain, in standard deviations of
+/// the noise and of the simulator's roughness.
+pub const UNEXPLAINED: f64 = 1.5;
 
 /// Text of a value or its deviation: four decimals, or two significant figures if those would be
 /// zero.
@@ -164,6 +169,13 @@ pub struct RunResult {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unseen: Vec<Direction>,
     exploration: ExplorationResult,
+    /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    residual: Option<f64>,
+    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of the
+    /// simulator's roughness together; missing where the identifier fits nothing to the readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    misfit: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub articulation: Option<Articulation>,
     downstream: DownstreamResult,
@@ -183,6 +195,7 @@ impl RunResult {
         wall_s: f64,
     ) -> Result<Self> {
         let config = &session.config;
+        let identified = outcome.identified.as_ref();
         let episodes = outcome
             .real
             .as_ref()
@@ -203,6 +216,8 @@ impl RunResult {
                 &outcome.information,
                 outcome.real.as_ref().map_or(0.0, |r| r.contact_fraction),
             ),
+            residual: identified.map(|found| found.residual),
+            misfit: identified.and_then(|found| found.misfit),
             articulation: articulation(session, episodes.unwrap_or_default())?,
             downstream: DownstreamResult {
                 metric: session.task.downstream().metric.clone(),
@@ -230,16 +245,27 @@ pub fn parameter_line(m: &Marginal) -> String {
     )
 }
 
+/// How the range of a task's unknown of this name is widened.
+pub fn widen_by_setting(name: &str) -> String {
+    format!("widen it with --set parameter.{name}.range=[LOW,HIGH]")
+}
+
 /// Caveats of a posterior: where it piles up at an end of the prior's range, and what the data do
 /// not determine.
-pub fn caveats(parameters: &[Parameter], belief: &Posterior) -> Vec<String> {
+///
+/// `widen` tells how the range of an unknown is widened, by its name.
+pub fn caveats(
+    parameters: &[Parameter],
+    belief: &Posterior,
+    widen: impl Fn(&str) -> String,
+) -> Vec<String> {
     let edges = parameters.iter().zip(&belief.marginals).filter_map(|(p, m)| {
         let end = m.at_edge?;
         let [low, high] = p.range.map(figure);
         let (unit, space) = (&p.unit, if p.unit.is_empty() { "" } else { " " });
         let (name, end) = (&p.name, end.name());
         let piles = format!("{name} piles up at the {end} end of its range, {low} to {high}{space}{unit}");
-        let widen = format!("widen it with --set parameter.{name}.range=[LOW,HIGH]");
+        let widen = widen(name);
         Some(match m.searched {
             None => format!(
                 "{piles}: its true value may lie beyond, where no interval of this prior reaches; if that is \
@@ -268,6 +294,16 @@ pub fn caveats(parameters: &[Parameter], belief: &Posterior) -> Vec<String> {
         )
     });
     edges.chain(unseen).collect()
+}
+
+/// Warning of a fit that leaves more than noise and roughness explain.
+pub fn unexplained(found: &Identified) -> Option<String> {
+    let misfit = found.misfit.filter(|misfit| *misfit > UNEXPLAINED)?;
+    Some(format!(
+        "the simulator does not explain the logs: at the best fit the readings are off by {misfit:.1} times \
+         their noise and the simulator's roughness together, and the intervals are widened for it; check the noise, \
+         the start of the machine and whether something else differs from the scene"
+    ))
 }
 
 /// The joint between the task's two tracked parts, estimated from real episodes; `None` where there

@@ -7,12 +7,13 @@ use crate::pipeline::{self, Method, RunOutcome};
 use anyhow::Result;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
-use super::interrupt;
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
-use super::result::{RunResult, articulation_line, caveats, figure, parameter_line};
+use super::result::{
+    RunResult, articulation_line, caveats, figure, parameter_line, unexplained, widen_by_setting,
+};
 use super::session::Session;
-use super::trace;
+use super::{failure, interrupt, trace};
 
 /// Arguments of `run`.
 #[derive(clap::Args)]
@@ -46,8 +47,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     report
         .notes
         .extend(result.articulation.as_ref().map(articulation_line));
-    let caveats = caveats(&session.parameters, &outcome.belief);
+    let caveats = caveats(&session.parameters, &outcome.belief, widen_by_setting);
     report.notes.extend(caveats.iter().cloned());
+    let warning = outcome.identified.as_ref().and_then(unexplained);
+    report.notes.extend(warning.clone());
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(
@@ -64,6 +67,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         report.write(folder)?;
         Ok(())
     })?;
+    if let Some(warning) = &warning {
+        failure::warn(warning);
+    }
     let mut stdout = std::io::stdout().lock();
     if arguments.common.json {
         writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;

@@ -113,7 +113,8 @@ impl Session {
             config,
         };
         asid_algorithms::fisher::inert::check_parameters(&session.problem())?;
-        session.real = World::open(&session, &scene, session.world_streams())?;
+        let seed = common.machine.unwrap_or(session.config.seed);
+        session.real = World::open(&session, &scene, world_streams(seed))?;
         Ok(session)
     }
 
@@ -135,7 +136,7 @@ impl Session {
 
     /// Random streams of the real world, which cannot be derived from those of the method.
     fn world_streams(&self) -> Streams {
-        Streams::new(self.config.seed).sealed("world")
+        world_streams(self.config.seed)
     }
 
     /// The start pose of a stage that takes one, in the order of its coordinates.
@@ -215,6 +216,11 @@ impl Session {
             env_steps: self.env_steps.load(Ordering::Relaxed),
         }
     }
+}
+
+/// Random streams of the real world of this seed.
+fn world_streams(seed: u64) -> Streams {
+    Streams::new(seed).sealed("world")
 }
 
 /// Warning about a true value outside the prior, with the end and the distance; `None` for one

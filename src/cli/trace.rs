@@ -205,9 +205,12 @@ pub fn parameters_of(
                 std: if m.unidentified { f64::NAN } else { m.std },
                 interval95: m.interval95,
                 prior: Some(match p.scale {
-                    Scale::Linear | Scale::Binary(_) => r::Prior::Uniform { low, high },
+                    Scale::Linear => r::Prior::Uniform { low, high },
                     Scale::Log => r::Prior::LogUniform { low, high },
+                    // Its two values are equally likely.
+                    Scale::Binary(_) => r::Prior::Binary { probability: 0.5 },
                 }),
+                searched: m.searched,
                 narrowing: std::iter::once(prior_quantiles)
                     .chain(after)
                     .enumerate()
@@ -221,4 +224,31 @@ pub fn parameters_of(
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: the report of an unknown that is 0 or 1 said "uniform, 0 to 1" of its prior, and
+    /// drew a density with a peak at each value. Cause: its prior was written as a uniform one.
+    #[test]
+    fn an_unknown_that_is_0_or_1_is_drawn_as_two_probabilities() {
+        let unknowns = [asid_core::Parameter {
+            name: "articulated".into(),
+            targets: vec!["joint/hinge/frictionloss".parse().unwrap()],
+            range: [0.0, 1.0],
+            scale: Scale::Binary([5.0, 0.1]),
+            unit: String::new(),
+        }];
+        let samples = [0.0, 1.0, 1.0, 1.0].map(|x| vec![x]).into();
+        let belief = asid_core::Posterior::from_samples(&unknowns, samples, &[1.0; 4]);
+        let report = r::RunReport {
+            parameters: parameters_of(&unknowns, None, &belief, None),
+            ..r::RunReport::default()
+        };
+        let page = report.html();
+        assert!(page.contains("1 with probability 0.5"), "{page}");
+        assert!(page.contains("0.50 before, 0.75 after"), "{page}");
+    }
 }

@@ -91,7 +91,8 @@ fn of_episode(
     Ok(Some(view))
 }
 
-/// A designed motion: `qpos` at the ends of frames of `period` seconds.
+/// A designed motion: `qpos` at the ends of frames of `period` seconds. Its first row is the end of
+/// the first frame.
 pub fn of_motion(subject: &Subject, qpos: &[f64], period: f64) -> Result<Option<View>> {
     let nq = subject.plant.layout.nq.max(1);
     let time: Vec<f64> = (0..qpos.len() / nq).map(|k| k as f64 * period).collect();

@@ -238,3 +238,22 @@ fn a_joint_may_stay_at_the_end_of_its_range_where_the_limit_ends_before_it() {
         "{said}"
     );
 }
+
+/// Symptom: "your logs so far tell it to" the same with any `--noise`. Cause: the option counted for
+/// the motion alone, and the logs had the noise of the study. In a linear machine a deviation is
+/// proportional to the noise.
+#[test]
+fn the_noise_of_the_options_holds_for_the_logs_too() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    let known = |noise: [&str; 2]| {
+        let design = ["explore", "cart", "--quiet", "--explorer", "random"];
+        let limit = ["--limit-position", "rail:-0.4:0.4", "--seconds", "2"];
+        let noise = ["--json", "--noise", noise[0], "--noise", noise[1]];
+        let said = ok(&place, &[&design[..], &limit, &noise, &SHORT].concat());
+        json(&said)["unknowns"][0]["logs"].as_f64().unwrap()
+    };
+    let (once, twice) = (known(["x:0.001", "dx:0.01"]), known(["x:0.002", "dx:0.02"]));
+    // The prior's own information is less than a thousandth of that of the logs.
+    assert!((twice / once - 2.0).abs() < 0.01, "{once} {twice}");
+}

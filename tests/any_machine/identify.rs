@@ -1,5 +1,14 @@
 //! `asid identify` and `export` on a study.
 
+use std::collections::BTreeMap;
+
+use asid::core::episode::ChannelColumns;
+use asid::core::registry::{BackendEntry, find};
+use asid::core::{Episode, Scene};
+use asid::mjcf::Plant;
+use asid::sysid::dataset::{Dataset, Replayer};
+use asid::sysid::gap::fit_start;
+
 use super::cli_support::Workplace;
 use super::world::{MASS, NOMINAL, Truth, write_study};
 use super::{json, mass, ok};
@@ -141,4 +150,65 @@ fn logs_that_are_all_warm_up_are_called_too_short_for_a_gap() {
     let said = ok(&place, &["export", "cart", "--mjcf", "out.xml"]);
     assert!(said.contains("the logs held out are too short"), "{said}");
     assert!(said.contains("gap on the logs fitted"), "{said}");
+}
+
+/// Symptom: arbitrary estimates, and residuals of hundreds of noises, on logs without a start in
+/// which a body turns by more than half a turn. Cause: its spin began at 0, and residuals of an
+/// orientation wrap after half a turn, so that the fit of the start did not find the spin.
+#[test]
+fn the_start_of_a_spinning_body_is_found_from_a_whole_log() {
+    let xml = r#"<mujoco model="ball"><option timestep="0.002" gravity="0 0 0"/><worldbody>
+        <body name="ball"><freejoint/><geom type="sphere" size="0.1" mass="1"/></body></worldbody>
+        <sensor><framequat name="q" objtype="xbody" objname="ball"/></sensor></mujoco>"#;
+    let scene = Scene::from_xml("ball", xml, &[]).unwrap();
+    let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
+    let model = backend.load(&scene).unwrap();
+    let plant = Plant::of(&scene).unwrap();
+    // A free ball turns steadily: here at 8 rad/s for a second, read with an error of 5 mrad.
+    let (rows, spin, sigma) = (101, 8.0_f64, 5e-3_f64);
+    let time: Vec<f64> = (0..rows).map(|k| 0.01 * k as f64).collect();
+    let readings = time.iter().enumerate().flat_map(|(k, t)| {
+        let error = sigma * 1.4 * (1.7 * (k * k) as f64).sin();
+        let half = 0.5 * (spin * t + error);
+        [half.cos(), 0.0, 0.0, half.sin()]
+    });
+    let episode = Episode {
+        readings: readings.collect(),
+        time,
+        channels: vec![ChannelColumns {
+            name: "q".into(),
+            len: 4,
+        }],
+        ..Episode::default()
+    };
+    let noise = BTreeMap::from([("q".to_owned(), sigma)]);
+    let data = Dataset::new(&plant, &[("log".into(), episode)], &noise).unwrap();
+    let trial = &data.trials[0];
+    let mut replayer = Replayer::new(&*model, &[], 1 + 2 * trial.open.len(), 1).unwrap();
+    let start = fit_start(&mut replayer, &plant.layout, &data, trial, &[], rows).unwrap();
+    // Such errors tell the slope of an angle over a second to 2 mrad/s.
+    assert!((start.qvel[5] - spin).abs() < 0.01, "{:?}", start.qvel);
+}
+
+/// Symptom: "widen it with --set parameter.mass.range=[LOW,HIGH]", which `asid identify STUDY`
+/// refuses. Cause: the words were those for a task, whose settings have its unknowns; a study has
+/// them itself.
+#[test]
+fn a_range_that_is_too_narrow_is_widened_in_the_study() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    let study = place.read("cart/study.toml");
+    let narrow = study.replace("range = [0.4, 3.0]", "range = [0.4, 1.2]");
+    assert!(study != narrow && MASS > 1.2);
+    place.write("cart/study.toml", &narrow);
+    let said = ok(&place, &["identify", "cart", "--quiet", "--out", "fit"]);
+    assert!(said.contains("mass piles up at the high end"), "{said}");
+    let way = "give `mass` a wider `range` in [[parameter]]";
+    let page = place.read("fit/report.html");
+    for text in [said, page] {
+        assert!(
+            text.contains(way) && !text.contains("--set parameter"),
+            "{text}"
+        );
+    }
 }

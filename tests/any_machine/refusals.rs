@@ -2,6 +2,7 @@
 
 use super::cli_support::Workplace;
 use super::world::{NOMINAL, Truth, write_study};
+use super::{json, ok};
 
 #[test]
 fn what_is_wrong_is_told_in_one_line() {
@@ -132,4 +133,34 @@ fn motions_that_cannot_be_played_are_refused_in_a_line() {
         &["--unknown", "geom/cart/mass:0.4:3", "--seconds", "1e6"],
         &["seconds", "physics steps", "at most 200 s"],
     );
+}
+
+/// Symptom: `asid export` wrote no file on rapier where the document has a tendon. Cause: the
+/// document is right, but rapier cannot load it for the gaps.
+#[test]
+fn a_document_that_a_smaller_engine_refuses_is_written_all_the_same() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    let model = NOMINAL.replace(r#"damping="2""#, r#"damping="2" armature="0.1""#);
+    place.write("cart/nominal.xml", &model);
+    let refined = "model = \"nominal.xml\"\n[[effect]]\neffect = \"backlash\"\nsite = \"rail\"\n\
+                   parameters = { width = 0.01 }\n";
+    place.write("cart/refined.toml", refined);
+    let study = place.read("cart/study.toml");
+    let study = study.replace("nominal.xml", "refined.toml");
+    place.write("cart/study.toml", &study);
+    let export = [
+        "export",
+        "cart",
+        "--backend",
+        "rapier",
+        "--mjcf",
+        "out.xml",
+        "--json",
+    ];
+    let said = json(&ok(&place, &export));
+    let refused = said["refused"].as_str().unwrap();
+    assert!(refused.contains("<tendon>"), "{said}");
+    assert!(said["gap"].as_array().unwrap().is_empty(), "{said}");
+    assert!(place.read("out.xml").contains("<fixed name=\"rail_whole\""));
 }

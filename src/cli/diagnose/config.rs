@@ -166,6 +166,7 @@ impl Config {
         let mut table = given(common)?;
         let mut of_run = toml::Table::new();
         let runs_task = arguments.runs_task(&table);
+        let keeps_logs = arguments.keeps_logs_of(&table);
         if runs_task {
             let others: Vec<String> = table
                 .keys()
@@ -180,6 +181,8 @@ impl Config {
         if arguments.study.is_some() || arguments.task.is_some() {
             config.study.clone_from(&arguments.study);
             config.task.clone_from(&arguments.task);
+        }
+        if !keeps_logs {
             config.train.clone_from(&arguments.train);
             config.test.clone_from(&arguments.test);
         }
@@ -221,6 +224,16 @@ impl Config {
         }
         if config.search.has_a_zero() {
             return Err(wrong("search", "every number is at least 1"));
+        }
+        if config.task.is_none() && common.preset.is_some() {
+            return Err(wrong("--preset", "goes with a task"));
+        }
+        if !config.train.is_empty() && config.experiments.is_some_and(|n| n > 0) {
+            return Err(wrong(
+                "--experiments",
+                "are played in the simulated real world that the logs come from, and these logs are given: leave out \
+                 --experiments, or `train`",
+            ));
         }
         if runs_task {
             config.runs.get_or_insert(RUNS);

@@ -1,7 +1,7 @@
 //! A task in its simulated real world: the source of a diagnosis' logs, and the test of its answer.
 //!
-//! There is a single machine, whose hidden truth is the same in every run. Start poses, trackers'
-//! noise and wear are drawn anew for each seed.
+//! There is a single machine, whose hidden truth and perturbations are the same in every run. Start
+//! poses, trackers' noise and wear are drawn anew for each seed.
 
 use anyhow::Result;
 use asid_algorithms::explore::{Discriminating, Rival};
@@ -98,6 +98,7 @@ impl Machine {
             common: Common {
                 backend: Some(config.backend.clone()),
                 seed: Some(config.seed),
+                machine: Some(config.seed),
                 threads: common.threads,
                 base: of_run,
                 quiet: true,
@@ -297,5 +298,44 @@ fn trial(world: &str, simulator: &str, runs: &[Run]) -> TaskTrial {
         simulator: simulator.to_owned(),
         values: runs.iter().map(|r| r.value).collect(),
         successes: runs.iter().filter(|r| r.success).count(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: `asid diagnose --task TASK --world perturbed` found no value of a mass or of a
+    /// delay that fits all of its logs. Cause: the seed of each run drew another perturbation, so
+    /// that the logs were those of as many machines.
+    #[test]
+    fn all_runs_are_of_one_perturbed_machine() {
+        let task = "sphere-striking";
+        let config: Config = toml::from_str(&format!("task = \"{task}\"")).unwrap();
+        let worlds = Worlds {
+            real: Real {
+                world: Some("perturbed".into()),
+                ..Real::default()
+            },
+            ..Worlds::default()
+        };
+        let of = |session: Session| session.perturbed().unwrap().drawn.clone();
+        let algorithms = Algorithms::default();
+        let of_run = toml::Table::new();
+        let machine =
+            Machine::new(&config, of_run, &Common::default(), &algorithms, &worlds).unwrap();
+        let run = |k| of(machine.session(k, &machine.worlds).unwrap());
+        assert_eq!(run(0), run(3));
+        // Runs of their own are of as many machines as seeds; the first is the same.
+        let alone = |seed| {
+            let common = Common {
+                backend: Some(config.backend.clone()),
+                seed: Some(seed),
+                ..Common::default()
+            };
+            of(Session::open(task, &common, &algorithms, &worlds).unwrap())
+        };
+        assert_eq!(alone(0), run(0));
+        assert_ne!(alone(0), alone(3));
     }
 }

@@ -15,9 +15,7 @@ pub fn lines(
     let mut all = Vec::new();
     let mut line = |text: &str| all.push(text.to_owned());
     line(&result.sentence);
-    let mut mends: Vec<&str> = result.wiring.iter().map(|w| &*w.mend).collect();
-    mends.dedup();
-    for text in mends.iter().flat_map(|m| m.lines()) {
+    for text in result.wiring.iter().flat_map(|w| w.mend.lines()) {
         line(&format!("  {text}"));
     }
     let gap = &result.gap;

@@ -79,6 +79,7 @@ pub(super) fn look(
             .map(Unchanging::line),
     );
     let mended = mend(&study, &machine, &Settings::default())?;
+    let is_late = mended.wiring.iter().any(|fault| fault.fault == CLOCK);
     for fault in &mended.wiring {
         if fault.fault == CLOCK {
             said.push(format!(
@@ -102,8 +103,12 @@ pub(super) fn look(
             fault.columns.join(", "),
             fault.probability
         ));
-        for (place, mapping) in places.into_iter().flatten().zip(lines) {
+        for (place, mut mapping) in places.into_iter().flatten().zip(lines) {
             let found = &mut proposal.matches[place];
+            // A clock is left to the diagnosis as a whole: all columns are late, or none.
+            if is_late {
+                mapping.delay = found.mapping.as_ref().map_or(0.0, |own| own.delay);
+            }
             found
                 .reasons
                 .push(format!("tried in the model: {}", fault.fault));

@@ -200,7 +200,9 @@ fn told(u: &UnknownResult, wanted: f64) -> String {
             to(u.motion)
         ),
     };
+    let by_range = u.prior <= 0.01 * wanted * u.reference;
     let enough = match u.repeats {
+        Some(0) if u.logs.is_none() || by_range => "its range is narrow enough".to_owned(),
         Some(0) => "your logs are enough".to_owned(),
         Some(1) => "one play is enough".to_owned(),
         Some(n) => format!("it takes {n} plays"),
@@ -257,4 +259,35 @@ pub fn lines(result: &ExploreResult) -> Vec<String> {
         result.objective, result.explorer, result.seconds, result.cost.wall_s
     ));
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: "your logs are enough" of an unknown of a model without logs. Cause: no play was
+    /// needed, and the words did not tell a narrow range from informative logs.
+    #[test]
+    fn a_range_within_the_precision_is_not_called_logs() {
+        let scale = |prior: f64, logs: Option<f64>| UnknownResult {
+            name: "body/link/mass".into(),
+            unit: "kg".into(),
+            value: 1.0,
+            reference: 1.0,
+            prior,
+            logs,
+            motion: 1e-3,
+            by_slopes: None,
+            both: logs,
+            repeats: Some(0),
+        };
+        // The deviation of a uniform range of 0.99 to 1.01 is its width over the root of twelve.
+        let narrow = 0.02 / 12.0_f64.sqrt();
+        for u in [scale(narrow, None), scale(narrow, Some(narrow))] {
+            let said = told(&u, 1.0);
+            assert!(said.contains("its range is narrow enough"), "{said}");
+        }
+        let said = told(&scale(0.3, Some(narrow)), 1.0);
+        assert!(said.contains("your logs are enough"), "{said}");
+    }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use asid_core::episode::InitialState;
 use asid_core::problem::home;
-use asid_core::{Episode, Error, Layout, Scene};
+use asid_core::{Capabilities, Episode, Error, Layout, Scene};
 use asid_diagnosis::study::Study;
 use asid_effects::native::{PlainModel, plain};
 use asid_effects::{Native, RefinedModel};
@@ -60,6 +60,18 @@ struct ExportResult {
     engine: String,
     effects: Vec<EffectRow>,
     left_out: Vec<String>,
+    /// Why the engine, which lacks some of MJCF, did not simulate the document.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<String>,
+    gap: Vec<GapRow>,
+}
+
+/// What the document gives in the engine.
+#[derive(Default)]
+struct Comparison {
+    /// Values that it does not reproduce, a sentence each.
+    differing: Vec<String>,
+    refused: Option<String>,
     gap: Vec<GapRow>,
 }
 
@@ -74,13 +86,12 @@ pub fn export(request: &Request<'_>) -> Result<()> {
     let written = plain(&*subject.backend, &subject.source, folder)?;
     let name = request.out.display().to_string();
     let scene = Scene::from_xml(&name, &written.xml, &[])?.in_directory(Some(folder.to_owned()));
-    let exported = Subject::of_scene(scene, &subject)?;
-    let mut left_out = written.left_out.clone();
-    left_out.extend(values_that_differ(&written, &exported)?);
-    let gap = match &subject.study {
-        Some(study) => gaps(study, &subject, &exported)?,
-        None => Vec::new(),
-    };
+    let Comparison {
+        differing,
+        refused,
+        gap,
+    } = compared(&subject, &written, scene)?;
+    let left_out = [&written.left_out[..], &differing].concat();
     create(request.out, &written.xml)?;
     let effects = written.effects.iter();
     let result = ExportResult {
@@ -99,6 +110,7 @@ pub fn export(request: &Request<'_>) -> Result<()> {
             })
             .collect(),
         left_out,
+        refused,
         gap,
     };
     let mut stdout = std::io::stdout().lock();
@@ -117,7 +129,7 @@ pub fn export(request: &Request<'_>) -> Result<()> {
         count("left-out"),
     )?;
     let sentences = result.effects.iter().filter_map(|e| e.sentence.as_ref());
-    for sentence in sentences.chain(&result.left_out) {
+    for sentence in sentences.chain(&result.left_out).chain(&result.refused) {
         writeln!(stdout, "  {sentence}")?;
     }
     for row in &result.gap {
@@ -132,6 +144,32 @@ pub fn export(request: &Request<'_>) -> Result<()> {
         )?;
     }
     Ok(())
+}
+
+/// Simulates the document in the model's engine.
+///
+/// An engine that claims less than MJCF may refuse what is right. One that claims all of it refuses
+/// only what is wrong.
+fn compared(subject: &Subject, written: &PlainModel, scene: Scene) -> Result<Comparison> {
+    let compare = || -> Result<Comparison> {
+        let exported = Subject::of_scene(scene, subject)?;
+        Ok(Comparison {
+            differing: values_that_differ(written, &exported)?,
+            refused: None,
+            gap: match &subject.study {
+                Some(study) => gaps(study, subject, &exported)?,
+                None => Vec::new(),
+            },
+        })
+    };
+    let lacks = subject.backend.capabilities() != Capabilities::all();
+    compare().or_else(|error| match error.downcast_ref::<Error>() {
+        Some(Error::Scene { .. } | Error::Incapable { .. }) if lacks => Ok(Comparison {
+            refused: Some(format!("the gaps are not measured: {error}")),
+            ..Comparison::default()
+        }),
+        _ => Err(error),
+    })
 }
 
 impl Subject {

@@ -15,11 +15,12 @@ use asid_sysid::gap::{gap, too_short};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
-use crate::cli::identify::UNEXPLAINED;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
-use crate::cli::result::{CostResult, ParameterResult, SCHEMA, Versions, caveats, parameter_line};
+use crate::cli::result::{
+    CostResult, ParameterResult, SCHEMA, UNEXPLAINED, Versions, caveats, parameter_line,
+};
 use crate::cli::settings::{given, parsed};
 use crate::cli::{failure, interrupt, run, trace};
 
@@ -157,7 +158,7 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         },
         versions: Versions::with(subject.engine()),
     };
-    let caveats = caveats(&study.parameters, &found.posterior);
+    let caveats = caveats(&study.parameters, &found.posterior, widen);
     let mut lines: Vec<String> = found
         .posterior
         .marginals
@@ -200,6 +201,11 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         ));
     }
     Ok(())
+}
+
+/// How the range of a study's unknown of this name is widened.
+fn widen(name: &str) -> String {
+    format!("give `{name}` a wider `range` in [[parameter]] of the study")
 }
 
 /// The model with the fitted values.

@@ -111,12 +111,18 @@ fn told(result: &ExploreResult) -> Section {
     section
 }
 
-/// A line over the frames of the motion.
-fn series(result: &ExploreResult, values: impl Iterator<Item = f64>) -> Vec<[f64; 2]> {
+/// A line over the frames of a motion, the first of them after `first` periods.
+fn series(period: f64, first: usize, values: impl Iterator<Item = f64>) -> Vec<[f64; 2]> {
     values
         .enumerate()
-        .map(|(k, x)| [k as f64 * result.period, x])
+        .map(|(k, x)| [(first + k) as f64 * period, x])
         .collect()
+}
+
+/// The course of one of `nq` coordinates: `positions` are those at the ends of the frames.
+fn course(positions: &[f64], (coordinate, nq): (usize, usize), period: f64) -> Vec<[f64; 2]> {
+    let values = positions.iter().skip(coordinate).step_by(nq);
+    series(period, 1, values.copied())
 }
 
 fn commands(result: &ExploreResult, subject: &Subject, found: &Designed) -> Section {
@@ -128,10 +134,11 @@ fn commands(result: &ExploreResult, subject: &Subject, found: &Designed) -> Sect
         .enumerate()
         .take(DRAWN)
         .map(|(a, actuator)| {
-            let points = series(result, found.commands.iter().skip(a).step_by(nu).copied());
+            let commands = found.commands.iter().skip(a).step_by(nu).copied();
+            let points = series(result.period, 0, commands);
             let title = format!("Command of {}", actuator.name);
             let chart = Chart::new(&title, Axis::new("time", "s"), Axis::new("command", ""))
-                .clock("", 0.0)
+                .clock("", result.period)
                 .layer(Layer::steps(points).colour(Colour::Blue));
             Figure::new(
                 title,
@@ -145,23 +152,14 @@ fn commands(result: &ExploreResult, subject: &Subject, found: &Designed) -> Sect
 fn joints(result: &ExploreResult, subject: &Subject, found: &Designed, limits: &Limits) -> Section {
     let nq = subject.plant.layout.nq;
     let figures = limits.joints.iter().take(DRAWN).map(|joint| {
-        let points = series(
-            result,
-            found
-                .played
-                .qpos
-                .iter()
-                .skip(joint.qpos)
-                .step_by(nq)
-                .copied(),
-        );
+        let points = course(&found.played.qpos, (joint.qpos, nq), result.period);
         let title = format!("Position of {}", joint.name);
         let mut chart = Chart::new(
             &title,
             Axis::new("time", "s"),
             Axis::new("position", "rad or m"),
         )
-        .clock("", 0.0)
+        .clock("", result.period)
         .layer(Layer::line(points).colour(Colour::Blue));
         for end in joint.position.iter().flatten() {
             chart = chart.layer(Layer::horizontal(*end).colour(Colour::Muted).label("limit"));
@@ -184,4 +182,26 @@ fn repeat(result: &ExploreResult) -> Section {
             ("time".into(), format!("{:.1} s", result.cost.wall_s)),
             ("made smaller by".into(), figure(result.scale)),
         ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: on the page a joint moved a period before its command. Cause: positions at the ends
+    /// of the frames were drawn at their beginnings.
+    #[test]
+    fn positions_are_drawn_at_the_ends_of_their_frames() {
+        // Under an acceleration of 1 m/s² a cart is at t²/2; a second joint rests at 7.
+        let period = 0.1;
+        let ends = (1..=20).map(|k| period * f64::from(k));
+        let positions: Vec<f64> = ends.flat_map(|t| [0.5 * t * t, 7.0]).collect();
+        let points = course(&positions, (0, 2), period);
+        assert_eq!(points.len(), 20);
+        for [t, x] in points {
+            assert!((x - 0.5 * t * t).abs() < 1e-12, "{x} at {t}");
+        }
+        // A command begins with its frame.
+        assert_eq!(series(period, 0, [4.0].into_iter())[0], [0.0, 4.0]);
+    }
 }

@@ -51,8 +51,14 @@ impl<'a> Setup<'a> {
         let sought = config.sought(subject);
         let plant = &subject.plant;
         let limits = Limits::new(plant, &|j| range_of(subject, j), &config.limits()?)?;
+        notes.extend(limits.unchecked.iter().cloned());
         let data = match &subject.study {
-            Some(study) => Some(Dataset::new(plant, &study.train, &study.noise)?),
+            Some(study) => {
+                // That of the options holds for the logs too.
+                let mut noise = study.noise.clone();
+                noise.extend(config.noise.clone());
+                Some(Dataset::new(plant, &study.train, &noise)?)
+            }
             None => None,
         };
         let signals = sensors::signals(subject, data.as_ref(), &config.noise, &mut notes)?;

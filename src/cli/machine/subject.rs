@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::Result;
-use asid_core::{Backend, Error, Model};
+use asid_core::{Backend, Episode, Error, Model};
 use asid_diagnosis::study::Study;
 use asid_effects::RefinedModel;
 use asid_mjcf::Plant;
@@ -104,11 +104,13 @@ impl Subject {
 /// Removes from the first rows of a study's logs the readings that follow a command from before the
 /// log.
 fn open_first_rows(model: &dyn Model, plant: &Plant, study: &mut Study) -> Result<()> {
-    let Some((_, episode)) = study.train.first() else {
+    let logs = study.train.iter().chain(&study.test);
+    let logs: Vec<&Episode> = logs.map(|(_, episode)| episode).collect();
+    let Some(first) = logs.first() else {
         return Ok(());
     };
-    let (start, _) = start_of(plant, episode);
-    let followers = Followers::of(model, &start, episode)?;
+    let (start, _) = start_of(plant, first);
+    let followers = Followers::of(model, &start, &logs)?;
     let logs = study.train.iter_mut().chain(&mut study.test);
     logs.for_each(|(_, episode)| followers.open(episode));
     Ok(())
