@@ -4,6 +4,7 @@
 mod absent;
 mod estimated_short;
 mod open_loop;
+mod share_left;
 mod unchanging;
 
 use asid_core::Result;
@@ -17,7 +18,7 @@ use crate::wiring::{self, Settings};
 
 pub use absent::{Absent, absent};
 pub use estimated_short::Short;
-use open_loop::OpenLoop;
+use share_left::share_left;
 pub use unchanging::{Unchanging, pass_over};
 
 /// Share of the residual power up to which corrected wiring is the more probable cause.
@@ -212,6 +213,7 @@ impl Intake {
                     each.join("; "),
                     self.wiring
                         .iter()
+                        .filter(|w| !w.mend.is_empty())
                         .map(|w| w.mend.replace('\n', " "))
                         .collect::<Vec<_>>()
                         .join(" ")
@@ -219,46 +221,6 @@ impl Intake {
             },
         })
     }
-}
-
-/// Residual power of the columns concerned with the corrected wiring, relative to that with the
-/// wiring `as_given`.
-///
-/// It is taken from replays of the model as given. The geometric mean over the columns needs no
-/// noise and weights them equally.
-fn share_left(intake: &Intake, as_given: &Study, machine: &Machine) -> Result<f64> {
-    let [mended, given] = [&intake.study, as_given].map(|s| open_loop_power(s, machine));
-    let concerned = |sensor: &str| {
-        let mut columns = intake.wiring.iter().flat_map(|w| &w.columns);
-        columns.any(|c| c == sensor)
-    };
-    let (mended, given) = (mended?, given?);
-    let pairs = mended.iter().zip(&given);
-    let own = pairs.filter(|((name, m), (_, g))| concerned(name) && *m > 0.0 && *g > 0.0);
-    let logs: Vec<f64> = own.map(|((_, m), (_, g))| (m / g).ln()).collect();
-    Ok((logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp())
-}
-
-/// Mean squared residual of each sensor's training readings in replays of the model as given, in
-/// its unit squared.
-fn open_loop_power(study: &Study, machine: &Machine) -> Result<Vec<(String, f64)>> {
-    let replayed = OpenLoop::of(study, machine)?;
-    let (logs, residuals) = (replayed.logs(), replayed.residuals());
-    let of_sensor = |(sensor, name): (usize, String)| {
-        let entries = logs.entries.iter().enumerate();
-        let own = entries.filter(|(_, e)| e.sensor == sensor);
-        let readings = own.flat_map(|(j, _)| {
-            let each = residuals.iter();
-            each.flat_map(move |r| r.iter().skip(j).step_by(logs.entries.len()))
-        });
-        let squares: Vec<f64> = readings.map(|r| r * r).filter(|p| p.is_finite()).collect();
-        (
-            name,
-            squares.iter().sum::<f64>() / squares.len().max(1) as f64,
-        )
-    };
-    let names = logs.sensors.iter().map(|s| s.name.clone());
-    Ok(names.enumerate().map(of_sensor).collect())
 }
 
 /// Describes a wiring fault in words.

@@ -83,7 +83,9 @@ fn regime(
     }
     let place = layout.sensors.iter().position(|s| s.name == sensor);
     match place.map(|p| plant.sensors[p]) {
-        Some(Reads::Joint(j)) if layout.joints[j].kind != JointKind::Free => {
+        Some(Reads::Joint(j))
+            if matches!(layout.joints[j].kind, JointKind::Hinge | JointKind::Slide) =>
+        {
             joint_regime(plant, path, j, row)
         }
         Some(Reads::Body(b)) => body_regime(plant, shown, path, b, row),

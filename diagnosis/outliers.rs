@@ -9,7 +9,10 @@
 //! - A strong acceleration bends several readings in the same direction. An outlier bends its
 //!   neighbours in the opposite direction, half as much as itself.
 
+use asid_core::layout::Sensor;
 use asid_core::{Episode, Layout};
+
+use crate::wiring::record::align_signs;
 
 /// Distance from both lines, relative to the typical distance, from which on a reading is an
 /// outlier.
@@ -82,21 +85,29 @@ fn distances(time: &[f64], column: impl Iterator<Item = f64>) -> Vec<Distances> 
         .collect()
 }
 
+/// Returns a sensor's readings in a log, `rows x entries`, with the signs of quaternions aligned.
+fn table(episode: &Episode, layout: &Layout, sensor: &Sensor) -> Vec<f64> {
+    let mut table = episode.select(layout, std::slice::from_ref(&sensor.name));
+    if sensor.len == 4 {
+        align_signs(&mut table, sensor.len, 0);
+    }
+    table
+}
+
 /// Sets outliers to NaN in some logs with common sensors; returns how many there were.
 pub fn leave_out(logs: &mut [&mut Episode], layout: &Layout) -> Vec<LeftOut> {
     let mut found = Vec::new();
     for sensor in &layout.sensors {
         let mut far: Vec<Vec<usize>> = vec![Vec::new(); logs.len()];
         let mut readings = 0;
+        let tables: Vec<Vec<f64>> = logs.iter().map(|e| table(e, layout, sensor)).collect();
         for c in 0..sensor.len {
             let each: Vec<Vec<Distances>> = logs
                 .iter()
-                .map(|e| {
-                    let width = e.width();
-                    e.channel(&sensor.name).map_or_else(Vec::new, |range| {
-                        let column = e.readings.iter().skip(range.start + c).step_by(width);
-                        distances(&e.time, column.copied())
-                    })
+                .zip(&tables)
+                .map(|(e, table)| {
+                    let column = table.iter().skip(c).step_by(sensor.len);
+                    distances(&e.time, column.copied())
                 })
                 .collect();
             let both = |d: &Distances| {
@@ -200,6 +211,32 @@ mod tests {
         assert_eq!(found[0].count, 4, "{found:?}");
         let gone: Vec<usize> = (0..600).filter(|&k| log.readings[k].is_nan()).collect();
         assert_eq!(gone, spikes);
+    }
+
+    /// Symptom: readings of a turning body were left out one by one.
+    ///
+    /// Cause: a quaternion with the other sign is far from those before and after it, number by
+    /// number, though it is the same orientation.
+    #[test]
+    fn an_orientation_of_the_other_sign_stays() {
+        let mut layout = layout();
+        layout.sensors[0].kind = "framequat".into();
+        layout.sensors[0].len = 4;
+        let turned = |k: usize| {
+            let half = 0.005 * k as f64 + 1e-4 * noise(k);
+            let sign = if k == 300 { -1.0 } else { 1.0 };
+            [half.cos(), 0.0, 0.0, half.sin()].map(|x| sign * x)
+        };
+        let mut log = Episode {
+            time: (0..600).map(|k| 0.01 * f64::from(k)).collect(),
+            channels: vec![ChannelColumns {
+                name: "place".into(),
+                len: 4,
+            }],
+            readings: (0..600).flat_map(turned).collect(),
+            ..Episode::default()
+        };
+        assert_eq!(leave_out(&mut [&mut log], &layout), []);
     }
 
     #[test]

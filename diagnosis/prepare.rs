@@ -21,22 +21,29 @@ use crate::study::Study;
 /// Share of a held-out episode on which an unknown initial state is fitted.
 const HEAD: f64 = 0.1;
 
-/// Returns the sensors with readings in at least one log, in the scene's order.
-fn logged_sensors(layout: &Layout, study: &Study) -> Vec<String> {
-    let episodes = || study.train.iter().chain(&study.test);
-    layout
-        .sensors
-        .iter()
-        .filter(|s| {
-            episodes().any(|(_, e)| {
-                let range = e.channel(&s.name);
-                range.is_some_and(|r| {
-                    (0..e.rows()).any(|k| e.reading(k)[r.clone()].iter().any(|x| x.is_finite()))
-                })
-            })
+/// Whether a log has a reading of a sensor.
+fn reads(episode: &Episode, sensor: &str) -> bool {
+    let is_read = |columns: std::ops::Range<usize>| {
+        let mut rows = 0..episode.rows();
+        rows.any(|k| {
+            let mut reading = episode.reading(k)[columns.clone()].iter();
+            reading.any(|x| x.is_finite())
         })
-        .map(|s| s.name.clone())
-        .collect()
+    };
+    episode.channel(sensor).is_some_and(is_read)
+}
+
+/// Returns the sensors that are compared, in the scene's order.
+///
+/// They have readings in at least one log, and a known noise: a log to fit to shows it, or the study
+/// gives it.
+fn compared_sensors(layout: &Layout, study: &Study) -> Vec<String> {
+    let is_compared = |name: &str| {
+        let any = |logs: &[(String, Episode)]| logs.iter().any(|(_, e)| reads(e, name));
+        any(&study.train) || (study.noise.contains_key(name) && any(&study.test))
+    };
+    let sensors = layout.sensors.iter().filter(|s| is_compared(&s.name));
+    sensors.map(|s| s.name.clone()).collect()
 }
 
 /// Returns the residuals `logged - predicted` without whitening, in the sensors' units, one array
@@ -66,11 +73,14 @@ pub fn plain_residuals(
 /// Returns the sensors whose reading in the first row of a log follows an earlier command, so that
 /// no model can predict it.
 fn followers(machine: &Machine, study: &Study) -> Result<Followers> {
-    let Some((_, episode)) = study.train.first() else {
+    let logs = study.train.iter().chain(&study.test);
+    let logs: Vec<&Episode> = logs.map(|(_, episode)| episode).collect();
+    let Some(first) = logs.first() else {
         return Ok(Followers::default());
     };
-    let State { qpos, qvel } = given_start(&machine.plant, episode);
-    Followers::of(&*machine.with(&[])?, &InitialState { qpos, qvel }, episode)
+    let State { qpos, qvel } = given_start(&machine.plant, first);
+    let start = InitialState { qpos, qvel };
+    Followers::of(&*machine.with(&[])?, &start, &logs)
 }
 
 /// Returns the bench of a study, with its noise not yet estimated, and the values of its parameters
@@ -135,10 +145,10 @@ fn left_of_first_rows(bench: &Bench, nominal: &[f64]) -> Result<f64> {
 /// Returns the bench of a study and the values of its parameters, for a machine with a given home.
 fn dataset_of(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     let layout = machine.plant.layout.clone();
-    let sensors = logged_sensors(&layout, study);
+    let sensors = compared_sensors(&layout, study);
     if sensors.is_empty() {
         return Err(Error::Failed(format!(
-            "study {}: no log has a reading that is left, once late columns are moved and outliers left out: log longer episodes",
+            "study {}: no log to fit to has a reading that is left, once late columns are moved and outliers left out: log longer episodes",
             study.name
         )));
     }
@@ -162,7 +172,7 @@ fn dataset_of(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     let nominal = study
         .parameters
         .iter()
-        .map(|p| Ok(model.nominal(&p.targets[0])?.clamp(p.range[0], p.range[1])))
+        .map(|p| Ok(p.value_of(model.nominal(&p.targets[0])?)))
         .collect::<Result<Vec<_>>>()?;
     let open = open_coordinates(&layout, study);
     let point = Point {

@@ -79,6 +79,11 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
                 0.0
             }
         };
+        // Spins are about the body's own axes.
+        let spin = || {
+            let turn = nalgebra::Vector3::from(rotation_difference(&later, &first));
+            unit_quaternion(&first).inverse() * turn / dt.max(1e-9)
+        };
         match plant.sensors[i] {
             Reads::Joint(j) => {
                 let joint = &layout.joints[j];
@@ -87,7 +92,10 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
                         qpos[joint.qpos] = first[0];
                         qvel[joint.qvel] = rate(0);
                     }
-                    "jointvel" => qvel[joint.qvel] = first[0],
+                    "ballquat" => {
+                        qpos[joint.qpos..joint.qpos + 4].copy_from_slice(&first);
+                        qvel[joint.qvel..joint.qvel + 3].copy_from_slice(spin().as_slice());
+                    }
                     _ => {}
                 }
             }
@@ -104,10 +112,7 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
                     }
                     "framequat" => {
                         qpos[joint.qpos + 3..joint.qpos + 7].copy_from_slice(&first);
-                        let turn = rotation_difference(&later, &first);
-                        let own = unit_quaternion(&first).inverse() * nalgebra::Vector3::from(turn)
-                            / dt.max(1e-9);
-                        qvel[joint.qvel + 3..joint.qvel + 6].copy_from_slice(own.as_slice());
+                        qvel[joint.qvel + 3..joint.qvel + 6].copy_from_slice(spin().as_slice());
                     }
                     _ => {}
                 }
@@ -117,10 +122,11 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
     }
     // A measured speed is better than a difference.
     for (i, sensor) in layout.sensors.iter().enumerate() {
-        if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
+        if let (Reads::Joint(j), "jointvel" | "ballangvel") = (plant.sensors[i], &*sensor.kind)
             && let Some((first, ..)) = seen(&sensor.name)
         {
-            qvel[layout.joints[j].qvel] = first[0];
+            let place = layout.joints[j].qvel;
+            qvel[place..place + first.len()].copy_from_slice(&first);
         }
     }
 }
@@ -174,4 +180,51 @@ pub(crate) fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
         }
     }
     (0..2 * nv).filter(|&c| open[c]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::episode::ChannelColumns;
+    use asid_core::{Episode, Scene};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+
+    const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="pivot" type="ball"/>
+        <geom size="0.05" pos="0 0 -0.3" mass="1"/></body></worldbody>
+        <sensor><ballquat name="turn" joint="pivot"/><ballangvel name="spin" joint="pivot"/></sensor></mujoco>"#;
+
+    /// Symptom: the gap of a right pendulum on a ball joint was enormous in logs that begin at 60
+    /// degrees and do not give the initial state.
+    ///
+    /// Cause: its sensor counted as reading no joint, so that it began where the document places it,
+    /// at rest. A replay from there does not move, and the prior of the start had no width.
+    #[test]
+    fn a_ball_joint_begins_where_its_sensors_read_it() {
+        let plant = Plant::of(&Scene::from_xml("pendulum", PENDULUM, &[]).unwrap()).unwrap();
+        let (begin, spin) = (
+            UnitQuaternion::from_euler_angles(1.0, 0.2, -0.4),
+            Vector3::new(0.3, -0.8, 2.0),
+        );
+        let turn = |k: usize| {
+            // The spin is about the pendulum's own axes.
+            let q = begin * UnitQuaternion::from_scaled_axis(0.01 * k as f64 * spin);
+            vec![q.w, q.i, q.j, q.k]
+        };
+        let log = |name: &str, reading: &dyn Fn(usize) -> Vec<f64>| Episode {
+            time: (0..20).map(|k| 0.01 * f64::from(k)).collect(),
+            channels: vec![ChannelColumns {
+                name: name.into(),
+                len: reading(0).len(),
+            }],
+            readings: (0..20).flat_map(reading).collect(),
+            ..Episode::default()
+        };
+        let is_near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        let found = given_start(&plant, &log("turn", &turn));
+        assert!(is_near(&found.qpos, &turn(0)), "{:?}", found.qpos);
+        assert!(is_near(&found.qvel, spin.as_slice()), "{:?}", found.qvel);
+        let found = given_start(&plant, &log("spin", &|_| vec![1.0, 2.0, 3.0]));
+        assert_eq!(found.qvel, [1.0, 2.0, 3.0]);
+    }
 }

@@ -100,14 +100,52 @@ impl Study {
         .with_test()
     }
 
-    /// Composes a further mapping, of logs as this study reads them, with the study's own of that
-    /// name.
+    /// Composes a further mapping, of logs as this study reads them, with the study's own mappings.
     ///
-    /// The result maps the files themselves and replaces the study's own mapping.
+    /// The results map the files themselves and replace the study's own mappings of their names.
+    /// There is one for each entry of a vector if the study maps any of its entries, since these
+    /// precede a mapping of the vector.
     #[must_use]
-    pub fn composed(&self, further: &ColumnMapping) -> ColumnMapping {
+    pub fn composed(&self, further: &ColumnMapping, layout: &Layout) -> Vec<ColumnMapping> {
         let source = further.from.as_deref().unwrap_or(&further.name);
-        let Some(own) = self.columns.iter().find(|m| m.name == source) else {
+        let entry = |vector: &str, i: usize| format!("{vector}.{i}");
+        let len = layout.sensor(&further.name).map_or(1, |s| s.len);
+        let is_mapped = |i: usize| {
+            let name = entry(source, i);
+            self.columns.iter().any(|m| m.name == name)
+        };
+        if len > 1 && (0..len).any(is_mapped) {
+            let each = (0..len).map(|i| ColumnMapping {
+                name: entry(&further.name, i),
+                from: further.from.as_ref().map(|from| entry(from, i)),
+                ..further.clone()
+            });
+            return each.map(|m| self.composed_with_own(&m, layout)).collect();
+        }
+        vec![self.composed_with_own(further, layout)]
+    }
+
+    /// Returns the study's own mapping of a quantity, which for an entry may be that of its vector.
+    fn own(&self, name: &str, layout: &Layout) -> Option<ColumnMapping> {
+        let of = |name: &str| self.columns.iter().find(|m| m.name == name);
+        if let Some(own) = of(name) {
+            return Some(own.clone());
+        }
+        let (vector, entry) = name.rsplit_once('.')?;
+        let i: usize = entry.parse().ok()?;
+        let len = layout.sensor(vector).ok()?.len;
+        let whole = of(vector).filter(|_| i < len)?;
+        Some(ColumnMapping {
+            name: name.to_owned(),
+            from: whole.from.as_ref().map(|from| format!("{from}.{i}")),
+            ..whole.clone()
+        })
+    }
+
+    /// Composes a further mapping with the study's own one of the quantity that it reads.
+    fn composed_with_own(&self, further: &ColumnMapping, layout: &Layout) -> ColumnMapping {
+        let source = further.from.as_deref().unwrap_or(&further.name);
+        let Some(own) = self.own(source, layout) else {
             return further.clone();
         };
         let mut whole = further.clone();
@@ -174,3 +212,6 @@ fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
         .collect();
     Ok(InitialState { qpos, qvel })
 }
+
+#[cfg(test)]
+pub(crate) mod tests;

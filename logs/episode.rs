@@ -23,12 +23,16 @@ use asid_core::{Episode, Error, Result};
 
 #[cfg(feature = "parquet")]
 pub use self::parquet::ParquetFile;
+#[cfg(feature = "parquet")]
+pub(crate) use self::parquet::number_in;
 pub use clock::seconds;
 pub use mapping::{ColumnMapping, counts, unit_counts, unit_factor};
-pub use notes::LogNotes;
+pub use notes::{LogNotes, some_log_has_columns};
 pub use reader::is_of_start;
 pub use remapped::remapped;
 pub use table::{Table, of_table, quantities, wanted};
+
+use crate::format::LogFormat;
 
 /// Reads a log of a scene with this layout: `.parquet` as a Parquet file, any other name as CSV.
 ///
@@ -61,13 +65,25 @@ pub fn read_mapped(
     layout: &Layout,
     mappings: &[ColumnMapping],
 ) -> Result<(Episode, LogNotes)> {
+    read_as(LogFormat::of(path), path, layout, mappings)
+}
+
+/// Reads a log as [`read_mapped`] does, as a Parquet file if that is its kind, else as CSV.
+///
+/// # Errors
+/// As [`read_mapped`].
+pub fn read_as(
+    kind: LogFormat,
+    path: &Path,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) -> Result<(Episode, LogNotes)> {
     mappings.iter().try_for_each(|m| m.check(layout))?;
-    let ending = path.extension().map(|e| e.to_ascii_lowercase());
-    let read = |path: &Path| match ending.as_deref().and_then(|e| e.to_str()) {
+    let read = |path: &Path| match kind {
         #[cfg(feature = "parquet")]
-        Some("parquet") => parquet::read(path, layout, mappings),
+        LogFormat::Parquet => parquet::read(path, layout, mappings),
         #[cfg(not(feature = "parquet"))]
-        Some("parquet") => Err(
+        LogFormat::Parquet => Err(
             "is a Parquet file, which this build cannot read: build with `--features parquet`, \
                  or convert it to CSV"
                 .to_owned(),

@@ -10,7 +10,7 @@ use parquet::file::reader::FileReader as _;
 use parquet::record::Field;
 use parquet::schema::types::Type;
 
-use crate::episode::ParquetFile;
+use crate::episode::{ParquetFile, number_in};
 use crate::raw::RawLog;
 use crate::table_file::{self, Column};
 
@@ -112,21 +112,7 @@ fn numbers(field: &Field) -> Vec<f64> {
 }
 
 fn number(field: &Field) -> f64 {
-    match *field {
-        Field::Bool(x) => f64::from(u8::from(x)),
-        Field::Double(x) => x,
-        Field::Float(x) => f64::from(x),
-        Field::Float16(x) => f64::from(x),
-        Field::Int(x) => f64::from(x),
-        Field::Short(x) => f64::from(x),
-        Field::Byte(x) => f64::from(x),
-        Field::UInt(x) => f64::from(x),
-        Field::UShort(x) => f64::from(x),
-        Field::UByte(x) => f64::from(x),
-        Field::Long(x) | Field::TimestampMillis(x) | Field::TimestampMicros(x) => x as f64,
-        Field::ULong(x) => x as f64,
-        _ => f64::NAN,
-    }
+    number_in(field).unwrap_or(f64::NAN)
 }
 
 /// Reads a table with any names.

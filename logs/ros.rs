@@ -3,5 +3,6 @@
 
 pub mod cdr;
 pub mod definition;
+mod orientation;
 pub mod stream;
 pub mod topics;

@@ -163,6 +163,29 @@ mod tests {
         assert_eq!(log.series.len(), 2);
     }
 
+    /// Symptom: a table with a row of units below its header had no column at all ("nothing is left in
+    /// the log").
+    ///
+    /// Cause: stamps were counted from the first cell, which was no number, so that none was.
+    #[test]
+    fn a_row_without_a_stamp_leaves_the_other_rows_theirs() {
+        let column = |name: &str, values: [f64; 3]| Column {
+            values: values.into(),
+            ..Column::named(name)
+        };
+        for start in [0.0, 1.7e9] {
+            let time = column("time", [f64::NAN, start, start + 0.01]);
+            let angle = column("angle", [f64::NAN, 1.0, 2.0]);
+            let log = log("log", &[time, angle]).unwrap();
+            let [found] = &log.series[..] else {
+                panic!("{:?}", log.series)
+            };
+            assert_eq!(found.values, [1.0, 2.0]);
+            assert_eq!(found.time[0], 0.0);
+            assert!((found.time[1] - 0.01).abs() < 1e-6, "{:?}", found.time);
+        }
+    }
+
     #[test]
     fn stamps_that_are_dates_are_named() {
         let column = |name: &str, text: &str, value: f64| Column {

@@ -98,12 +98,13 @@ impl Trial {
 
 /// Commands for each simulation of a [`Trial`].
 ///
-/// They are those of the first row. For each actuator, its command is replaced by the one of the
-/// log that is farthest from it.
-fn commands(episode: &Episode, nu: usize) -> Vec<f64> {
-    let first = &episode.ctrl[..nu];
+/// They are those of the first row of the first log. For each actuator, its command is replaced by
+/// the one of all logs that is farthest from it, or by none: a simulation begins without a command.
+fn commands(logs: &[&Episode], first: &[f64]) -> Vec<f64> {
+    let nu = first.len();
     let farthest = |a: usize| {
-        let all = episode.ctrl.iter().skip(a).step_by(nu).copied();
+        let of_logs = logs.iter().flat_map(|e| e.ctrl.iter().skip(a).step_by(nu));
+        let all = of_logs.copied().chain([0.0]);
         let far = |x: &f64| (x - first[a]).abs();
         all.filter(|x| x.is_finite())
             .max_by(|x, y| far(x).total_cmp(&far(y)))
@@ -124,21 +125,22 @@ pub struct Followers {
 }
 
 impl Followers {
-    /// Finds the followers among the sensors of a log, in states along a replay from an initial
-    /// state.
+    /// Finds the followers among the sensors of some logs, in states along a replay of the first of
+    /// them from an initial state.
     ///
     /// # Errors
     /// As [`Simulator::rollout`].
-    pub fn of(model: &dyn Model, start: &InitialState, episode: &Episode) -> Result<Self> {
+    pub fn of(model: &dyn Model, start: &InitialState, logs: &[&Episode]) -> Result<Self> {
         let layout = model.layout();
         let nu = layout.nu();
-        let is_read = |name: &str| episode.channel(name).is_some();
+        let is_read = |name: &str| logs.iter().any(|e| e.channel(name).is_some());
         let sensors = layout.sensors.iter().filter(|s| is_read(&s.name));
         let sensors: Vec<String> = sensors.map(|s| s.name.clone()).collect();
-        if nu == 0 || sensors.is_empty() || episode.rows() < 2 {
+        let first = logs.first().filter(|e| e.rows() > 1);
+        let Some(episode) = first.filter(|_| nu > 0 && !sensors.is_empty()) else {
             return Ok(Self::default());
-        }
-        let commands = commands(episode, nu);
+        };
+        let commands = commands(logs, &episode.ctrl[..nu]);
         let plan = ReplayPlan::new(layout, episode, episode.rows());
         let mut trial = Trial::new(model, &sensors)?;
         trial.begin(start)?;

@@ -83,23 +83,42 @@ const FEWEST: usize = 200;
 /// Largest number of rows that a third difference spans if readings are missing: over more a
 /// residual is no parabola.
 const SPAN: usize = 12;
-/// Rows over which third differences are taken.
+/// The same for a sensor that reads once in several rows, in its own usual distance between
+/// readings. A third difference spans three of these, so that one more may be missing.
+const SPAN_OF_SLOW: usize = 4;
+/// Readings over which third differences are taken: as many rows for a sensor that reads in each.
 ///
 /// Over the last of them even noise of the largest correlation is independent, to 0.97^64 = 0.14.
-/// Over fewer rows its differences only double from stride to stride, whatever its standard
+/// Over fewer readings its differences only double from stride to stride, whatever its standard
 /// deviation.
 const STRIDES: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Fewest strides from which a correlation is estimated: noise, its correlation and a model error
 /// are three unknowns.
 const FEWEST_STRIDES: usize = 3;
 
+/// Largest number of rows that a third difference over neighbouring readings of a series spans.
+fn span(series: &[(usize, f64, f64)]) -> usize {
+    let mut rows: Vec<usize> = series.windows(2).map(|w| w[1].0 - w[0].0).collect();
+    if rows.is_empty() {
+        return SPAN;
+    }
+    let middle = rows.len() / 2;
+    let usual = *rows.select_nth_unstable(middle).1;
+    SPAN.max(SPAN_OF_SLOW * usual)
+}
+
 /// Magnitude of the third difference of a series (row, time, value) from some reading on.
 ///
 /// It is scaled so that white noise of standard deviation 1 gives sqrt(20), whatever the times
-/// between readings. `None` if it spans too many rows.
-fn third_difference(series: &[(usize, f64, f64)], from: usize, stride: usize) -> Option<f64> {
+/// between readings. `None` if it spans more than `span` rows for each reading of the stride.
+fn third_difference(
+    series: &[(usize, f64, f64)],
+    from: usize,
+    stride: usize,
+    span: usize,
+) -> Option<f64> {
     let four = [0, 1, 2, 3].map(|k| series[from + k * stride]);
-    if four[3].0 - four[0].0 > SPAN * stride {
+    if four[3].0 - four[0].0 > span * stride {
         return None;
     }
     // Weights of the divided difference, which vanishes for parabolas.
@@ -116,10 +135,10 @@ fn third_difference(series: &[(usize, f64, f64)], from: usize, stride: usize) ->
 
 /// Number of impacts before each reading of a series; across an impact, neighbouring readings are
 /// no parabola.
-fn impacts_before(series: &[(usize, f64, f64)]) -> Vec<usize> {
+fn impacts_before(series: &[(usize, f64, f64)], span: usize) -> Vec<usize> {
     let starts = 0..series.len().saturating_sub(3);
     let each: Vec<f64> = starts
-        .map(|i| third_difference(series, i, 1).unwrap_or(0.0))
+        .map(|i| third_difference(series, i, 1, span).unwrap_or(0.0))
         .collect();
     let typical = NORMAL * median(&mut each.clone()).unwrap_or(0.0);
     let mut count = 0;
@@ -146,14 +165,15 @@ pub struct ThirdDifferences([Vec<f64>; STRIDES.len()]);
 impl ThirdDifferences {
     /// Adds the differences of a series: row, time (s) and value of each reading that is present.
     pub fn add(&mut self, series: &[(usize, f64, f64)]) {
-        let impacts = impacts_before(series);
+        let span = span(series);
+        let impacts = impacts_before(series, span);
         for (&stride, found) in STRIDES.iter().zip(&mut self.0) {
             let starts = 0..series.len().saturating_sub(3 * stride);
             // Over a few rows the median is robust against impacts; over many, most differences
             // would span one.
             let is_smooth = |i: &usize| stride == 1 || impacts[*i] == impacts[i + 3 * stride];
             let smooth = starts.filter(is_smooth);
-            found.extend(smooth.filter_map(|i| third_difference(series, i, stride)));
+            found.extend(smooth.filter_map(|i| third_difference(series, i, stride, span)));
         }
     }
 
@@ -403,6 +423,22 @@ mod tests {
         }
     }
 
+    /// Symptom: a tracker at 30 Hz in a log at 200 Hz had a noise of a millionth of its range, and a
+    /// right model a gap of a thousand.
+    ///
+    /// Cause: four of its readings span 20 rows. A third difference spanned 12 at most, so there was
+    /// none.
+    #[test]
+    fn a_sensor_slower_than_the_rows_has_its_own_noise() {
+        let slow = |(k, x): (usize, f64)| (7 * k, 0.035 * k as f64, x);
+        let readings = coloured(0.0, 4000).into_iter().enumerate();
+        let series: Vec<(usize, f64, f64)> = readings.map(slow).collect();
+        let mut differences = ThirdDifferences::default();
+        differences.add(&series);
+        let found = differences.noise();
+        assert!((found.deviation - 1.0).abs() < 0.05, "{found:?}");
+    }
+
     #[test]
     fn two_missing_readings_of_three_leave_the_noise_as_it_is() {
         let series: Vec<(usize, f64, f64)> = coloured(0.0, 9000)
@@ -413,7 +449,7 @@ mod tests {
             .collect();
         let starts = 0..series.len() - 3;
         let mut found: Vec<f64> = starts
-            .filter_map(|i| third_difference(&series, i, 1))
+            .filter_map(|i| third_difference(&series, i, 1, SPAN))
             .collect();
         let deviation = NORMAL * median(&mut found).unwrap() / WHITE.sqrt();
         assert!((deviation - 1.0).abs() < 0.06, "{deviation}");

@@ -17,6 +17,8 @@ pub struct Absent {
     pub logs: Vec<String>,
     /// Whether these are all logs to fit to.
     pub never_fitted: bool,
+    /// Whether the study gives its noise.
+    pub has_noise: bool,
     /// Whether these are all held-out logs.
     pub never_held_out: bool,
 }
@@ -29,9 +31,12 @@ impl Absent {
         if self.logs.len() > NAMED {
             logs.push(format!("{} more", self.logs.len() - NAMED));
         }
-        let so = match (self.never_fitted, self.never_held_out) {
-            (_, true) => ": no log held out reads it, so that the gap says nothing of it",
-            (true, _) => ": no log to fit to reads it, so that nothing is fitted to it",
+        let so = match (self.never_fitted, self.never_held_out, self.has_noise) {
+            (_, true, _) => ": no log held out reads it, so that the gap says nothing of it",
+            (true, _, true) => ": no log to fit to reads it, so that nothing is fitted to it",
+            (true, _, false) => {
+                ": no log to fit to reads it, so that its noise is not known and it is passed over"
+            }
             _ => "",
         };
         format!(
@@ -72,6 +77,7 @@ pub fn absent<'s>(study: &Study, sensors: impl IntoIterator<Item = &'s str>) -> 
             logs,
             never_fitted,
             never_held_out,
+            has_noise: study.noise.contains_key(sensor),
         })
     };
     sensors.into_iter().filter_map(of).collect()

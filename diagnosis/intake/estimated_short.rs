@@ -37,7 +37,7 @@ fn values_at<'e>(
 
 /// Index of a column among the values of a shift: that of a scalar first, then those of a vector's
 /// entries.
-fn place_of<'c>(column: &'c str, sensor: &'c str) -> Option<usize> {
+pub(super) fn place_of<'c>(column: &'c str, sensor: &'c str) -> Option<usize> {
     match column.strip_prefix(sensor)? {
         "" => Some(0),
         entry => Some(1 + entry.strip_prefix('.')?.parse::<usize>().ok()?),
@@ -111,9 +111,7 @@ impl Intake {
             &further
         };
         wiring::mend::apply(&mut self.study, layout, mappings)?;
-        for w in &mut self.wiring {
-            w.mend = wiring::mend::lines(&self.study, &self.mappings, &w.columns);
-        }
+        wiring::mend::write_lines(&mut self.wiring, &self.study, layout, &self.mappings);
         Ok(())
     }
 

@@ -11,6 +11,11 @@ const FEW: f64 = 0.6;
 const FEWEST: f64 = 0.02;
 /// Smallest share of the growth that must fall within a condition.
 const MOST: f64 = 0.8;
+/// Digits of a threshold: it is exact to a thousandth of the range of its quantity, which is less
+/// than a plot shows.
+const DIGITS: f64 = 3.0;
+/// Most decimals of a threshold: a double has no more digits.
+const MOST_DECIMALS: f64 = 17.0;
 
 /// Returns the squared growth of an entry's residual over the [`WINDOW`] rows that end at each row,
 /// beyond that of noise alone.
@@ -107,7 +112,8 @@ impl Features {
 
     /// Returns the threshold beyond which [`MOST`] of the growth lies in the fewest rows.
     ///
-    /// Returns `None` if there is none, or if the residual grows by no more than noise.
+    /// The rows are those that fulfil the text. Returns `None` if there is none, or if the residual
+    /// grows by no more than noise.
     pub(super) fn condition(&self, growth: &[f64]) -> Option<String> {
         let known = growth.iter().filter(|g| g.is_finite());
         let total: f64 = known.clone().sum();
@@ -116,25 +122,51 @@ impl Features {
         }
         let mut best: Option<(f64, String)> = None;
         for ((name, values), order) in self.names.iter().zip(&self.values).zip(&self.order) {
-            let order = order.iter().filter(|&&i| growth[i].is_finite());
-            let m = order.clone().count();
-            let mut below = 0.0;
-            for (k, &i) in order.enumerate() {
-                below += growth[i];
-                let rows = (k + 1) as f64 / m as f64;
-                let share = below / total;
-                for (share, rows, sign) in [(share, rows, '<'), (1.0 - share, 1.0 - rows, '>')] {
-                    if rows < FEW && rows > FEWEST && share > MOST {
-                        let merit = share - rows;
-                        if best.as_ref().is_none_or(|(b, _)| merit > *b) {
-                            best = Some((merit, format!("{name} {sign} {:.3}", values[i])));
-                        }
+            let order: Vec<usize> = (order.iter().copied())
+                .filter(|&i| growth[i].is_finite())
+                .collect();
+            let sorted: Vec<f64> = order.iter().map(|&i| values[i]).collect();
+            // The growth in the first rows of this order.
+            let mut sums = vec![0.0];
+            for &i in &order {
+                sums.push(sums[sums.len() - 1] + growth[i]);
+            }
+            let all = order.len();
+            for (threshold, text) in thresholds(&sorted) {
+                let below = sorted.partition_point(|x| *x < threshold);
+                let up_to = sorted.partition_point(|x| *x <= threshold);
+                let above = sums[all] - sums[up_to];
+                for (growth, rows, sign) in [(sums[below], below, '<'), (above, all - up_to, '>')] {
+                    let (share, rows) = (growth / total, rows as f64 / all as f64);
+                    let merit = share - rows;
+                    let is_better = best.as_ref().is_none_or(|(b, _)| merit > *b);
+                    if rows < FEW && rows > FEWEST && share > MOST && is_better {
+                        best = Some((merit, format!("{name} {sign} {text}")));
                     }
                 }
             }
         }
         best.map(|(_, text)| text)
     }
+}
+
+/// Thresholds between values that are sorted, each with its text, from which it reads back.
+///
+/// Equal values are on one side of any threshold, so a quantity that is constant has none.
+fn thresholds(sorted: &[f64]) -> Vec<(f64, String)> {
+    let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
+        return Vec::new();
+    };
+    let decimals = (DIGITS - (last - first).log10()).ceil();
+    let decimals = decimals.clamp(0.0, MOST_DECIMALS) as usize;
+    let scale = 10_f64.powi(decimals as i32);
+    let between = sorted.windows(2).filter(|w| w[0] < w[1]);
+    // Adding 0 turns -0 into 0.
+    let rounded = between.map(|w| (0.5 * (w[0] + w[1]) * scale).round() / scale + 0.0);
+    let mut rounded: Vec<f64> = rounded.collect();
+    rounded.dedup();
+    let with_text = |x: f64| (x, format!("{x:.decimals$}"));
+    rounded.into_iter().map(with_text).collect()
 }
 
 fn sorted(values: &[f64]) -> Vec<usize> {
@@ -168,5 +200,69 @@ mod tests {
         let over = |rows: f64| Some(rows * rows - 2.0);
         let [four, five, six] = [4.0, 5.0, 6.0].map(over);
         assert_eq!(found, [None, None, five, five, five, six, four]);
+    }
+
+    fn features(columns: &[(&str, Vec<f64>)]) -> Features {
+        let values: Vec<Vec<f64>> = columns.iter().map(|c| c.1.clone()).collect();
+        Features {
+            names: columns.iter().map(|c| c.0.to_owned()).collect(),
+            order: values.iter().map(|v| sorted(v)).collect(),
+            values,
+        }
+    }
+
+    /// Share of the growth in the rows that fulfil a condition, as its text reads.
+    fn share(features: &Features, growth: &[f64], condition: &str) -> f64 {
+        let words: Vec<&str> = condition.split(' ').collect();
+        let threshold: f64 = words[2].parse().unwrap();
+        let column = features.names.iter().position(|n| n == words[0]).unwrap();
+        let is_in = |x: f64| match words[1] {
+            "<" => x < threshold,
+            _ => x > threshold,
+        };
+        let rows = features.values[column].iter().zip(growth);
+        let within: f64 = rows.filter(|(x, _)| is_in(**x)).map(|(_, g)| g).sum();
+        within / growth.iter().sum::<f64>()
+    }
+
+    /// Symptom: "where ctrl.u > 1.000", for a command that is never above 1.
+    ///
+    /// Cause: a threshold split rows with equal commands, which are in the order of their times.
+    #[test]
+    fn a_condition_holds_for_the_rows_in_which_the_residual_grows() {
+        let time = || (0..400).map(|k| 0.01 * f64::from(k));
+        // The same command in each of some logs, and growth between two times, not in all of them.
+        for (logs, grown, [on, off], [from, to], expected) in [
+            // A constant command.
+            (1, 1, [-1.0, 9.0], [2.5, 9.0], "time > 2.505"),
+            // A step.
+            (1, 1, [1.0, 3.5], [2.0, 3.5], "time > 2.005"),
+            (4, 3, [1.0, 3.0], [2.0, 3.0], "ctrl.u > 0.500"),
+        ] {
+            let (mut times, mut commands, mut growth) = (Vec::new(), Vec::new(), Vec::new());
+            for log in 0..logs {
+                for t in time() {
+                    times.push(t);
+                    commands.push(f64::from(u8::from(t > on && t < off)));
+                    let grows = log < grown && t > from && t < to;
+                    growth.push(50.0 * f64::from(u8::from(grows)));
+                }
+            }
+            let features = features(&[("ctrl.u", commands), ("time", times)]);
+            let found = features.condition(&growth).unwrap();
+            assert_eq!(found, expected);
+            assert!(share(&features, &growth, &found) > MOST);
+        }
+    }
+
+    /// Symptom: "where place > 0.000" for a stage that moves by half a millimetre.
+    #[test]
+    fn a_threshold_has_the_digits_of_its_range() {
+        let place = (0..400).map(|k| 1.25e-6 * f64::from(k)).collect();
+        let growth: Vec<f64> = (0..400).map(|k| if k > 300 { 50.0 } else { 0.0 }).collect();
+        let features = features(&[("place", place)]);
+        let found = features.condition(&growth).unwrap();
+        assert_eq!(found, "place > 0.0003756");
+        assert!(share(&features, &growth, &found) > MOST);
     }
 }

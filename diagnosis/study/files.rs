@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use asid_core::{Episode, Error, Layout, Result};
-use asid_logs::episode::{ColumnMapping, LogNotes, of_table, wanted};
+use asid_logs::episode::{ColumnMapping, LogNotes, of_table, read_as, wanted};
 use asid_logs::{LogSettings, Opener};
 
 /// Reads the logs of a study.
@@ -75,9 +75,9 @@ impl<'a> Logs<'a> {
         };
         // An episode of a dataset (`dataset#3`) is not a file of its own.
         let (at, _) = asid_logs::open::split(file);
-        if self.settings.kind_of(&at).is_table() {
-            let (episode, notes) =
-                asid_logs::episode::read_mapped(file, self.layout, self.columns)?;
+        let kind = self.settings.kind_of(&at);
+        if kind.is_table() {
+            let (episode, notes) = read_as(kind, file, self.layout, self.columns)?;
             return Ok(vec![(name(file), episode, notes)]);
         }
         let logs = self.opener.open(file, self.settings)?;

@@ -8,7 +8,8 @@ use super::view::{ColumnView, View};
 
 /// Largest delay of readings relative to commands that is searched for, s.
 ///
-/// It is that of a control stack with network buffers. Later readings are found at this edge.
+/// It is that of a control stack with network buffers. A clock that fits later readings better is
+/// not named.
 pub const LATEST: f64 = 0.2;
 /// Step between the delays that are tried, s.
 const DELAY_STEP: f64 = 0.02;

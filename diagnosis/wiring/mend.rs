@@ -115,21 +115,19 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     let mappings = mappings(&all, &view);
     let mut mended = study.clone();
     apply(&mut mended, layout, &mappings)?;
-    let wiring = found
+    let mut wiring: Vec<WiringResult> = found
         .iter()
-        .map(|f| {
-            let columns: Vec<String> = match f.fault {
+        .map(|f| WiringResult {
+            fault: f.fault.name().to_owned(),
+            columns: match f.fault {
                 Fault::Clock => sensors.clone(),
                 _ => f.quantities.iter().map(|&q| all[q].name.clone()).collect(),
-            };
-            WiringResult {
-                fault: f.fault.name().to_owned(),
-                mend: lines(study, &mappings, &columns),
-                columns,
-                probability: f.probability,
-            }
+            },
+            probability: f.probability,
+            mend: String::new(),
         })
         .collect();
+    write_lines(&mut wiring, study, layout, &mappings);
     let in_doubt = |f: &Found| f.fault.is_imitable() || f.probability < settings.certain;
     Ok(Mended {
         study: mended,
@@ -189,11 +187,28 @@ pub fn apply(study: &mut Study, layout: &Layout, mappings: &[ColumnMapping]) -> 
     Ok(())
 }
 
-/// Returns the lines for the study file of the mappings that concern some columns.
-pub fn lines(study: &Study, mappings: &[ColumnMapping], columns: &[String]) -> String {
-    let own = mappings.iter().filter(|m| concerns_any(m, columns));
-    let lines: Vec<String> = own.map(|m| study.composed(m).lines()).collect();
-    lines.join("\n")
+/// Sets the lines for the study file in each fault: those of the mappings that concern its columns.
+///
+/// A mapping has the corrections of all faults of its column. It is written once, with the first of
+/// them. A clock concerns every sensor, so its turn is last.
+pub fn write_lines(
+    wiring: &mut [WiringResult],
+    study: &Study,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) {
+    let mut faults: Vec<&mut WiringResult> = wiring.iter_mut().collect();
+    faults.sort_by_key(|f| f.fault == Fault::Clock.name());
+    let mut left: Vec<&ColumnMapping> = mappings.iter().collect();
+    for fault in faults {
+        let (own, others): (Vec<_>, Vec<_>) = left
+            .into_iter()
+            .partition(|m| concerns_any(m, &fault.columns));
+        left = others;
+        let composed = own.into_iter().flat_map(|m| study.composed(m, layout));
+        let lines: Vec<String> = composed.map(|m| m.lines()).collect();
+        fault.mend = lines.join("\n");
+    }
 }
 
 /// Whether a mapping concerns any of these columns.
@@ -241,4 +256,42 @@ fn mappings(all: &[Quantity], view: &View) -> Vec<ColumnMapping> {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::tests::study;
+
+    /// Symptom: pasted into the study file, the lines of the diagnosis were refused, since two
+    /// `[[column]]` had one name. An import wrote the delay of a clock into a single column.
+    ///
+    /// Cause: each fault had all lines of its columns, and a clock has the columns of all others.
+    #[test]
+    fn the_lines_of_two_faults_of_a_column_are_one_study_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let study = study(folder.path(), &[]);
+        let layout = asid_mjcf::Plant::of(&study.scene).unwrap().layout;
+        let late = |name: &str, sign: f64| ColumnMapping {
+            sign,
+            delay: 0.06,
+            ..ColumnMapping::of(name)
+        };
+        let mappings = [late("q", -1.0), late("tip", 1.0)];
+        let fault = |fault: Fault, columns: &[&str]| WiringResult {
+            fault: fault.name().into(),
+            columns: columns.iter().map(|c| (*c).to_owned()).collect(),
+            ..WiringResult::default()
+        };
+        let [clock, sign] = [
+            fault(Fault::Clock, &["q", "tip"]),
+            fault(Fault::Sign, &["q"]),
+        ];
+        for mut wiring in [[clock.clone(), sign.clone()], [sign, clock]] {
+            write_lines(&mut wiring, &study, &layout, &mappings);
+            let of = |kind: Fault| wiring.iter().find(|w| w.fault == kind.name()).unwrap();
+            assert_eq!(of(Fault::Sign).mend, mappings[0].lines());
+            assert_eq!(of(Fault::Clock).mend, mappings[1].lines());
+        }
+    }
 }

@@ -96,7 +96,7 @@ impl Series {
 /// orientation.
 ///
 /// A quaternion is four entries of a row from `first` on.
-fn align_signs(table: &mut [f64], width: usize, first: usize) {
+pub(crate) fn align_signs(table: &mut [f64], width: usize, first: usize) {
     let mut before: Option<[f64; 4]> = None;
     for row in table.chunks_exact_mut(width) {
         let q = &mut row[first..first + 4];

@@ -106,7 +106,7 @@ impl<'a> Windows<'a> {
         let model = machine.with(&[])?;
         let theta = parameters
             .iter()
-            .map(|p| Ok(model.nominal(&p.targets[0])?.clamp(p.range[0], p.range[1])))
+            .map(|p| Ok(p.value_of(model.nominal(&p.targets[0])?)))
             .collect::<Result<_>>()?;
         let simulator = model.simulator(&BatchConfig {
             size: windows.len(),

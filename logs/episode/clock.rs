@@ -29,11 +29,17 @@ fn row_time(stamps: &[f64]) -> Option<f64> {
     (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
+/// First stamp that is a number: a row of units, for example, has none. 0 if there is none.
+fn first(stamps: &[f64]) -> f64 {
+    let mut numbers = stamps.iter().copied().filter(|t| t.is_finite());
+    numbers.next().unwrap_or(0.0)
+}
+
 /// Unit of stamps: by their date if they count from 1970, else by their rate.
 ///
 /// The rate selects the coarsest unit in which rows are as frequent as a machine is sampled.
 fn unit(stamps: &[f64]) -> (&'static str, f64) {
-    let first = stamps.first().copied().unwrap_or(0.0);
+    let first = first(stamps);
     // In its own unit, a date of this century is one to ten times the year 2001.
     let dated = STAMPS
         .iter()
@@ -60,7 +66,7 @@ pub(super) fn to_seconds(stamps: &mut [f64], given: Option<f64>, notes: &mut Log
     if name != "s" {
         notes.time_unit = Some(name);
     }
-    let first = stamps.first().copied().unwrap_or(0.0);
+    let first = first(stamps);
     let start = if length == 1.0 && first.abs() < EPOCH {
         0.0
     } else {

@@ -3,9 +3,11 @@
 //! Logs of other stacks have names, units, signs and zeros of their own. A mapping states them
 //! once, and every reader applies it, so that logs are used as they were recorded.
 
-use asid_core::layout::Layout;
+use asid_core::layout::{Layout, Sensor};
 use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
+
+use super::entry_name;
 
 /// Kinds of quantity that a unit measures, in words.
 pub mod counts {
@@ -118,6 +120,12 @@ impl ColumnMapping {
             offset: 0.0,
             delay: 0.0,
         }
+    }
+
+    /// Whether it is a mapping of a sensor, or of an entry of it.
+    pub(super) fn is_of(&self, sensor: &Sensor) -> bool {
+        let entry = |i| entry_name(&sensor.name, sensor.len, i);
+        self.name == sensor.name || (0..sensor.len).any(|i| self.name == entry(i))
     }
 
     /// Factor of the column, with sign and unit; an unknown unit counts as 1.

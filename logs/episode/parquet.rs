@@ -40,30 +40,33 @@ fn read_rows(
     for (i, row) in file.get_row_iter(None).map_err(told)?.enumerate() {
         let row = row.map_err(|e| format!("row {}: {}", i + 2, told(e)))?;
         let fields: Vec<&Field> = row.get_column_iter().map(|(_, field)| field).collect();
-        reader.row(i + 2, |column| number(fields[column]))?;
+        reader.row(i + 2, |column| {
+            let field = fields[column];
+            let finite = number_in(field).filter(|x| !x.is_infinite());
+            finite.ok_or_else(|| field.to_string())
+        })?;
     }
     reader.finish()
 }
 
-/// The number in a cell; NaN where it is null.
-fn number(field: &Field) -> Result<f64, String> {
-    let x = match *field {
+/// The number in a cell, 0 or 1 for a truth value; NaN where it is null, `None` for anything else.
+pub(crate) fn number_in(field: &Field) -> Option<f64> {
+    Some(match *field {
         Field::Null => f64::NAN,
+        Field::Bool(x) => f64::from(u8::from(x)),
         Field::Double(x) => x,
         Field::Float(x) => f64::from(x),
+        Field::Float16(x) => f64::from(x),
         Field::Int(x) => f64::from(x),
         Field::Short(x) => f64::from(x),
         Field::Byte(x) => f64::from(x),
         Field::UInt(x) => f64::from(x),
-        Field::Long(x) => x as f64,
+        Field::UShort(x) => f64::from(x),
+        Field::UByte(x) => f64::from(x),
+        Field::Long(x) | Field::TimestampMillis(x) | Field::TimestampMicros(x) => x as f64,
         Field::ULong(x) => x as f64,
-        Field::TimestampMillis(x) | Field::TimestampMicros(x) => x as f64,
-        ref other => return Err(other.to_string()),
-    };
-    if x.is_infinite() {
-        return Err(x.to_string());
-    }
-    Ok(x)
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
@@ -71,13 +74,14 @@ mod tests {
     use std::fs::File;
     use std::sync::Arc;
 
-    use parquet::data_type::DoubleType;
+    use parquet::data_type::{BoolType, DataType, DoubleType, FloatType, Int32Type, Int64Type};
     use parquet::file::properties::WriterProperties;
     use parquet::file::writer::SerializedFileWriter;
     use parquet::schema::parser::parse_message_type;
 
     use super::*;
     use crate::episode::tests::layout;
+    use crate::format::LogFormat;
 
     /// Writes columns of doubles; `angle` may be null.
     fn write(path: &Path, time: &[f64], ctrl: &[f64], angle: &[Option<f64>]) {
@@ -118,6 +122,69 @@ mod tests {
             [a.readings[0], a.readings[2]],
             [b.readings[0], b.readings[2]]
         );
+        // A study may state the kind of a file with another ending.
+        let other = folder.path().join("log.pq");
+        std::fs::rename(folder.path().join("log.parquet"), &other).unwrap();
+        let (other, _) =
+            crate::episode::read_as(LogFormat::Parquet, &other, &layout(), &[]).unwrap();
+        assert_eq!((&other.time, &other.ctrl), (&a.time, &a.ctrl));
+    }
+
+    /// The angles of a log of two rows, in a column of some type, as both readers read them.
+    fn angles<T: DataType>(column: &str, angles: [T::T; 2]) -> [Vec<f64>; 2] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.parquet");
+        let schema = format!(
+            "message log {{ required double time; required double ctrl.servo; required {column}; }}"
+        );
+        let schema = Arc::new(parse_message_type(&schema).unwrap());
+        let properties = Arc::new(WriterProperties::default());
+        let mut file =
+            SerializedFileWriter::new(File::create(&path).unwrap(), schema, properties).unwrap();
+        let mut group = file.next_row_group().unwrap();
+        for values in [[0.0, 0.1], [1.0, 1.0]] {
+            let mut column = group.next_column().unwrap().unwrap();
+            let typed = column.typed::<DoubleType>();
+            typed.write_batch(&values, None, None).unwrap();
+            column.close().unwrap();
+        }
+        let mut column = group.next_column().unwrap().unwrap();
+        let typed = column.typed::<T>();
+        typed.write_batch(&angles, None, None).unwrap();
+        column.close().unwrap();
+        group.close().unwrap();
+        file.close().unwrap();
+        let episode = crate::episode::read(&path, &layout()).unwrap();
+        let columns = crate::parquet_file::columns(&path, false).unwrap();
+        let column = columns.into_iter().find(|(name, _)| name == "angle");
+        [episode.readings, column.unwrap().1]
+    }
+
+    /// Symptom: an import showed a column of an ADC and mapped it, and was then refused with "`512`
+    /// is not a finite number".
+    ///
+    /// Cause: two readers had each a list of the types of numbers, one without uint8, uint16 and
+    /// bool.
+    #[test]
+    fn numbers_of_every_type_are_the_same_to_both_readers() {
+        let whole = |kind: &str| angles::<Int32Type>(&format!("int32 angle {kind}"), [0, 120]);
+        let long = |kind: &str| angles::<Int64Type>(&format!("int64 angle {kind}"), [0, 120]);
+        for (found, wanted) in [
+            (angles::<BoolType>("boolean angle", [false, true]), 1.0),
+            (angles::<FloatType>("float angle", [0.0, 0.25]), 0.25),
+            (angles::<DoubleType>("double angle", [0.0, 0.1]), 0.1),
+            (whole(""), 120.0),
+            (whole("(INTEGER(8,true))"), 120.0),
+            (whole("(INTEGER(8,false))"), 120.0),
+            (whole("(INTEGER(16,true))"), 120.0),
+            (whole("(INTEGER(16,false))"), 120.0),
+            (whole("(INTEGER(32,false))"), 120.0),
+            (long(""), 120.0),
+            (long("(INTEGER(64,false))"), 120.0),
+            (long("(TIMESTAMP(MICROS,true))"), 120.0),
+        ] {
+            assert_eq!(found, [[0.0, wanted], [0.0, wanted]]);
+        }
     }
 
     #[test]

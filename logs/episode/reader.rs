@@ -96,11 +96,15 @@ impl<'a> Reader<'a> {
         }
         let mut channels = Vec::new();
         let mut readings = Vec::new();
+        let mut lacking = Vec::new();
         for s in &layout.sensors {
             let entry = |i: usize| (s.len > 1).then_some(i);
             let found: Vec<_> = (0..s.len).map(|i| find(&s.name, entry(i))).collect();
-            let mapped = mappings.iter().any(|m| m.name == s.name);
-            if found.iter().all(|(c, _)| c.is_none()) && !mapped {
+            if found.iter().all(|(c, _)| c.is_none()) {
+                if mappings.iter().any(|m| m.is_of(s)) {
+                    let missing = found.into_iter().take(1).map(|(_, column)| column);
+                    lacking.extend(missing.map(|column| (s.name.clone(), column)));
+                }
                 continue;
             }
             if let Some((_, missing)) = found.iter().find(|(c, _)| c.is_none()) {
@@ -122,15 +126,14 @@ impl<'a> Reader<'a> {
                 || state.iter().any(|(c, _, _)| *c == i)
         };
         let places = (0..header.len()).filter(|&i| !known(i));
-        let notes = noted(
+        let mut notes = noted(
             layout,
             &channels,
             places.map(|i| header[i].clone()).collect(),
         );
+        notes.lacking = lacking;
         if channels.is_empty() {
-            let near = notes.misspelt.first();
-            let near = near.map_or_else(String::new, |(a, b)| format!("; is `{a}` its `{b}`?"));
-            return Err(format!("has no column of a sensor of the scene{near}"));
+            return Err(notes.without_sensor());
         }
         Ok(Self {
             layout,

@@ -16,7 +16,7 @@ const SURE: f64 = 0.8;
 /// Largest difference of logarithms of the found factor and a unit's: 0.3 is 35 %.
 const NEAR: f64 = 0.3;
 
-/// Sets unit and sign of a speed from the displacements of its position.
+/// Sets unit and sign of a speed from the displacements of its position; a unit in its name stays.
 ///
 /// `own` is the position's series and factor.
 pub fn match_speed(found: &mut Match, log: &RawLog, own: (&Series, f64), dimension: Dimension) {
@@ -29,25 +29,27 @@ pub fn match_speed(found: &mut Match, log: &RawLog, own: (&Series, f64), dimensi
     let Some((per, sure)) = fit::speed_factor(speed, own.0) else {
         return;
     };
-    if sure.abs() < SURE || mapping.unit.is_some() {
+    if sure.abs() < SURE {
         return;
     }
     let wanted = per * own.1;
-    let units: &[&str] = match dimension {
-        Dimension::Angle => &["rad/s", "deg/s", "rpm"],
-        Dimension::Length => &["m/s", "cm/s", "mm/s"],
-        Dimension::Other => return,
-    };
-    let apart = |unit: &&&str| (wanted.abs() / unit_factor(unit).unwrap_or(1.0)).ln().abs();
-    let nearest = units.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-    let Some(unit) = nearest.filter(|u| apart(u) < NEAR) else {
-        found.reasons.push(format!(
-            "no unit makes it its position's speed: that is {wanted:.3} times it"
-        ));
-        return;
-    };
-    if *unit != units[0] {
-        mapping.unit = Some((*unit).to_owned());
+    if mapping.unit.is_none() {
+        let units: &[&str] = match dimension {
+            Dimension::Angle => &["rad/s", "deg/s", "rpm"],
+            Dimension::Length => &["m/s", "cm/s", "mm/s"],
+            Dimension::Other => return,
+        };
+        let apart = |unit: &&&str| (wanted.abs() / unit_factor(unit).unwrap_or(1.0)).ln().abs();
+        let nearest = units.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let Some(unit) = nearest.filter(|u| apart(u) < NEAR) else {
+            found.reasons.push(format!(
+                "no unit makes it its position's speed: that is {wanted:.3} times it"
+            ));
+            return;
+        };
+        if *unit != units[0] {
+            mapping.unit = Some((*unit).to_owned());
+        }
     }
     if wanted < 0.0 {
         mapping.sign = -1.0;

@@ -161,6 +161,24 @@ fn columns_of_a_script_are_told_by_words_units_and_the_displacement_that_they_ma
     assert_eq!(found.unused, ["temperature"]);
 }
 
+/// Symptom: a speed that counts the other way was mapped without a sign if its name has a unit.
+///
+/// Cause: a known unit ended the comparison with the position, before the sign was looked at.
+#[test]
+fn a_speed_with_a_unit_in_its_name_has_the_sign_of_its_position() {
+    let all = vec![
+        series("", "PanAngle", |t| motion(0, t)),
+        series("", "pan_speed_deg", |t| {
+            -((motion(0, t + 1e-5) - motion(0, t - 1e-5)) / 2e-5).to_degrees()
+        }),
+    ];
+    let found = proposed(all, LogFormat::Csv);
+    assert_eq!(from(&found, "dq_pan"), "pan_speed_deg");
+    let mappings = found.mappings();
+    let speed = mappings.iter().find(|m| m.name == "dq_pan").unwrap();
+    assert_eq!((speed.unit.as_deref(), speed.sign), (Some("deg/s"), -1.0));
+}
+
 #[test]
 fn a_log_of_the_models_own_names_needs_no_mapping() {
     let all = vec![

@@ -8,6 +8,7 @@
 use std::collections::HashMap;
 
 use super::cdr::Value;
+use super::orientation::align_signs;
 use crate::series::Series;
 
 /// Most series of one topic; with more, names change from message to message.
@@ -205,7 +206,9 @@ impl Stream {
                     values: kept.iter().map(|p| p.1).collect(),
                 }
             });
-        (series.filter(|s| !s.time.is_empty()).collect(), remark)
+        let mut series: Vec<Series> = series.filter(|s| !s.time.is_empty()).collect();
+        align_signs(&mut series);
+        (series, remark)
     }
 }
 

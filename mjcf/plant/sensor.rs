@@ -26,7 +26,8 @@ const ROUNDING: f64 = 1e-12;
 /// What a sensor of the document reads.
 pub(super) fn reads(document: &Document, layout: &Layout, sensor: &Sensor) -> Reads {
     let name = sensor.objname.as_deref().unwrap_or_default();
-    if sensor.kind.starts_with("joint") {
+    let of_joint = ["joint", "ball"];
+    if of_joint.iter().any(|kind| sensor.kind.starts_with(kind)) {
         let joint = layout.joints.iter().position(|j| j.name == name);
         return joint.map_or(Reads::Other, Reads::Joint);
     }

@@ -4,6 +4,7 @@
 #![cfg(feature = "logs")]
 #![allow(clippy::unwrap_used)]
 
+mod mapped;
 #[path = "../cli_support/program.rs"]
 mod program;
 mod rewritten;

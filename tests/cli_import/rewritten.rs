@@ -7,7 +7,7 @@ use super::{EPISODES, apart, diagnosed, each, fixture, import, told};
 use asid::diagnosis::study::Study;
 
 /// Logs of the fixture, each rewritten, in a folder.
-fn rewritten(folder: &Path, rewrite: impl Fn(usize, &str) -> String) -> Vec<PathBuf> {
+pub fn rewritten(folder: &Path, rewrite: impl Fn(usize, &str) -> String) -> Vec<PathBuf> {
     let one = |(i, name): (usize, &str)| {
         let csv = std::fs::read_to_string(fixture(&format!("csv/{name}.csv"))).unwrap();
         let path = folder.join(format!("{name}.csv"));
