@@ -1,9 +1,11 @@
 //! Calibration of the diagnosis on the user's own machine: it is repeated on simulated logs.
 //!
 //! The identified model, and that model with each of the leading explanations as fitted, simulates
-//! the logs' own commands from their own initial states. Sensor noise is added, and readings that
-//! the logs lack are left out. The simulated logs are then diagnosed as the real ones were. The
-//! probability of an answer should be how often it is right there.
+//! the logs' own commands from their own initial states. Sensor noise is added, encoders then
+//! round, and readings that the logs lack are left out. The simulated logs are then diagnosed as
+//! the real ones were. The probability of an answer should be how often it is right there.
+
+mod encoders;
 
 use asid_core::{Episode, Progress, Result, Streams};
 use rand_distr::StandardNormal;
@@ -18,6 +20,8 @@ use crate::settings::Settings;
 use crate::study::Study;
 use crate::telling::Diagnosis;
 use crate::work::Work;
+
+use encoders::{Steps, unrounded};
 
 /// Maximum number of simulated explanations, besides the one without effects: each needs several
 /// runs.
@@ -61,17 +65,19 @@ fn turned(q: &mut [f64], by: [f64; 3]) {
     }
 }
 
-/// Returns an episode with other readings plus noise; readings that are missing stay missing.
+/// Returns an episode with other readings plus noise, rounded to steps; readings that are missing
+/// stay missing.
 fn replaced(
     episode: &Episode,
     logs: &Logs,
-    predicted: &[f64],
+    (predicted, steps): (&[f64], &Steps),
     random: &mut impl rand::Rng,
 ) -> Episode {
     let mut other = episode.clone();
     let (width, all) = (logs.width(), other.readings.len() / other.time.len().max(1));
     let mut column = 0;
     for sensor in &logs.sensors {
+        let step = steps.get(&sensor.name).filter(|step| **step > 0.0);
         let len = match other.channel(&sensor.name) {
             Some(range) => {
                 for k in 0..predicted.len() / width {
@@ -82,6 +88,9 @@ fn replaced(
                         turned(&mut new, [noise(), noise(), noise()]);
                     } else {
                         new.iter_mut().for_each(|x| *x += noise());
+                    }
+                    if let Some(step) = step {
+                        new.iter_mut().for_each(|x| *x = (*x / step).round() * step);
                     }
                     for (old, new) in own.iter_mut().zip(new) {
                         if old.is_finite() {
@@ -111,6 +120,8 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
     let members = found.map_or_else(Vec::new, |f| {
         trials(&work.candidates, &f.candidates, &f.explanation)
     });
+    let values = (&explanation.fit.point.theta[..], bench.parameters.len());
+    let (theta, steps) = unrounded(&members, values);
     let mut random = Streams::new(seed).stream("calibration");
     let mut study = study.clone();
     let starts = [&explanation.fit.point.starts, &explanation.held_starts];
@@ -122,7 +133,7 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
         };
         let mut predictor = bench.predictor(&members, record)?;
         let point = Point {
-            theta: explanation.fit.point.theta.clone(),
+            theta: theta.clone(),
             starts: starts[..record.logs.episodes.len()].to_vec(),
         };
         let predicted = predictor.readings(&[point])?.pop().unwrap_or_default();
@@ -130,7 +141,8 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
             if predicted.iter().any(|x| !x.is_finite()) {
                 return Ok(None);
             }
-            *episode = replaced(episode, &record.logs, predicted, &mut random);
+            let read = (&predicted[..], &steps);
+            *episode = replaced(episode, &record.logs, read, &mut random);
         }
     }
     // Simulated logs have no wiring errors.
@@ -283,7 +295,7 @@ mod tests {
     use asid_mjcf::Plant;
 
     use super::*;
-    use crate::data::tests::log;
+    use crate::data::tests::{log, plant};
 
     /// Symptom: the verdict `none` with tolerances got about half of its probability. Cause: the
     /// tolerances were simulated as a further explanation, whose effects no answer could name.
@@ -315,8 +327,28 @@ mod tests {
         let row = |place: f64| [1.0, 0.0, 0.0, 0.0, place];
         let predicted = [row(1.0), row(2.0), row(3.0)].concat();
         let mut random = Streams::new(0).stream("calibration");
-        let other = replaced(&episode, &logs, &predicted, &mut random);
+        let read = (&predicted[..], &Steps::new());
+        let other = replaced(&episode, &logs, read, &mut random);
         assert_eq!(other.readings, [1.0, 2.0, 3.0]);
+    }
+
+    /// Symptom: with a coarse encoder the verdict was said to be right in none of the simulated
+    /// diagnoses. Cause: noise was added after the rounding, so that no simulated log showed steps.
+    #[test]
+    fn a_simulated_encoder_rounds_its_noise() {
+        let (name, episode) = log("a", &[0.0; 400]);
+        let prepared = |episode: &Episode| {
+            let logs = vec![(name.clone(), episode.clone())];
+            Logs::new(&plant(), &["place".to_owned()], logs).unwrap()
+        };
+        let mut logs = prepared(&episode);
+        logs.set_noise(&[0.001]);
+        let predicted: Vec<f64> = (0..400).map(|k| 2.5e-4 * f64::from(k)).collect();
+        let mut random = Streams::new(0).stream("calibration");
+        let read = (&predicted[..], &Steps::from([("place".to_owned(), 0.01)]));
+        let other = replaced(&episode, &logs, read, &mut random);
+        let step = crate::noise::step(&prepared(&other), 0);
+        assert!((step - 0.01).abs() < 1e-9, "{step}");
     }
 
     #[test]

@@ -206,7 +206,8 @@ fn all(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Vec<Motion>> {
     Ok(motions)
 }
 
-/// Makes a record of some training episodes with varied commands.
+/// Makes a record of some training episodes with varied commands, each as the log after all those
+/// of the study.
 fn varied(
     bench: &Bench,
     episodes: &[usize],
@@ -222,6 +223,9 @@ fn varied(
     let mut varied = Logs::new(&bench.machine.plant, &logs.channels(), played)?;
     let noise: Vec<f64> = logs.sensors.iter().map(|s| s.noise).collect();
     varied.set_noise(&noise);
+    // What changes from log to log goes on changing.
+    let next = logs.episodes.len() + bench.test.logs.episodes.len();
+    varied.episodes.iter_mut().for_each(|e| e.number = next);
     let starts = episodes.iter().map(|&e| starts[e].clone()).collect();
     Ok(Record::new(varied, starts))
 }

@@ -36,12 +36,12 @@ pub struct Unknown {
 }
 
 impl Unknown {
-    /// Makes a parameter that may move.
+    /// Makes a parameter that may move, unless it has only two values: these have no derivative.
     #[must_use]
     pub fn free(parameter: Parameter) -> Self {
         Self {
+            free: !parameter.is_binary(),
             parameter,
-            free: true,
         }
     }
 }

@@ -194,7 +194,7 @@ impl Telling<'_> {
         }
         let rest = short
             .and_then(|(before, after, _)| least_explained(&before, &after))
-            .or_else(|| least_made_up(&result.missing_force));
+            .or_else(|| least_made_up(&result.missing_force, &self.findings.left));
         let beyond = self.evidence.none.held_out.sqrt();
         let of_best = j.best_explanation().found.map(|i| &self.evidence.tried[i]);
         let of_best = of_best.map_or(self.evidence.none, |t| t.replayed);

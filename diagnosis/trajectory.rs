@@ -190,12 +190,14 @@ impl Trajectory {
 /// Returns the positions at the rows of an episode (`rows x nq`), replayed from the first initial
 /// state of `point`.
 ///
+/// `number` is the episode's among all logs of the study.
+///
 /// # Errors
 /// When a value is not physical or the engine fails.
 pub fn positions(
     model: &dyn Model,
     parameters: &[Parameter],
-    plan: &ReplayPlan,
+    (plan, number): (&ReplayPlan, usize),
     point: &Point,
 ) -> Result<Vec<f64>> {
     let layout = model.layout();
@@ -208,7 +210,7 @@ pub fn positions(
         threads: 1,
         targets: columns.targets(),
     })?;
-    simulator.set_parameters(&[0], &columns.row(&point.theta, 0))?;
+    simulator.set_parameters(&[0], &columns.row(&point.theta, number))?;
     for start in point.starts.iter().take(1) {
         simulator.set_state(&[0], &start.qpos, &start.qvel)?;
     }

@@ -31,7 +31,7 @@ impl Default for Replayed {
 pub struct Tried {
     /// Effects at their sites, sorted.
     pub effects: Vec<String>,
-    /// How many named things it is: a group counts once.
+    /// How many named things it is: a group counts once, a law found at one site after the other once for each.
     pub names: usize,
     /// Evidence over the model without effects, with the prior odds of its names, natural logarithm.
     #[serde(deserialize_with = "nullable::scalar")]

@@ -135,6 +135,17 @@ impl Parameter {
         }
     }
 
+    /// The value within the range whose setting of the targets is nearest to a given one.
+    #[must_use]
+    pub fn value_of(&self, setting: f64) -> f64 {
+        match self.scale {
+            Scale::Binary([off, on]) => {
+                f64::from(u8::from((setting - on).abs() < (setting - off).abs()))
+            }
+            Scale::Linear | Scale::Log => setting.clamp(self.range[0], self.range[1]),
+        }
+    }
+
     /// Prior standard deviation of the fraction of the range.
     fn unit_std(&self) -> f64 {
         if self.is_binary() { 0.5 } else { UNIFORM_STD }
@@ -234,6 +245,19 @@ mod tests {
         for (range, settings) in [([0.0, 2.0], [0.0, 1.0]), ([0.0, 1.0], [3.0, 3.0])] {
             assert!(parameter(range, Scale::Binary(settings)).check().is_err());
         }
+    }
+
+    /// Symptom: a hinge with a friction of 0.3 N m, which a parameter holds with 200 N m or leaves
+    /// at 0.3 N m, began as held. Cause: its setting, 0.3, was read as a value of the parameter.
+    #[test]
+    fn the_value_of_a_setting_is_the_one_that_sets_it() {
+        let binary = parameter([0.0, 1.0], Scale::Binary([200.0, 0.3]));
+        for (setting, value) in [(0.3, 1.0), (200.0, 0.0), (0.5, 1.0), (150.0, 0.0)] {
+            assert_eq!(binary.value_of(setting), value, "{setting}");
+        }
+        assert_eq!(binary.setting(binary.value_of(0.3)), 0.3);
+        let linear = parameter([0.5, 2.0], Scale::Linear);
+        assert_eq!([0.1, 1.0, 7.0].map(|x| linear.value_of(x)), [0.5, 1.0, 2.0]);
     }
 
     #[test]

@@ -19,15 +19,16 @@ pub fn identifiability(
     none: &Explanation,
     best: &Explanation,
 ) -> Vec<CheckResult> {
-    if parameters.is_empty() {
+    let fit = &none.fit;
+    // One of two values is chosen by replays, without a derivative, and is not fitted.
+    let p = fit.free.len();
+    if p == 0 {
         return vec![check(
             "excitation",
             true,
             "the study fits no parameter".into(),
         )];
     }
-    let fit = &none.fit;
-    let p = fit.free.len();
     // Per share of the range.
     let scale = |fit: &Fit, k: usize| {
         let i = fit.free[k];

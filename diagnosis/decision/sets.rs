@@ -5,7 +5,7 @@ use asid_results::evidence::Evidence;
 use crate::confidence::sigmoid;
 use crate::judgement::Hypothesis;
 
-use super::{Rules, closes_a_small_gap, has_skill, is_small, seen};
+use super::{Rules, closes_a_small_gap, has_skill, is_ordinary, is_small, seen};
 
 /// Least and largest probability of `unknown` where a set is named.
 const NAMED: [f64; 2] = [0.001, 0.999];
@@ -22,7 +22,8 @@ pub(super) struct Sets<'e> {
     scores: Vec<f64>,
     /// Index in `all` of each set that was tried.
     places: Vec<usize>,
-    /// Index of the tried set that names no effect, but has tolerances only.
+    /// Index of the tried set that the search found if it has tolerances and names no effect,
+    /// beside those that the logs show without a search.
     pub(super) ordinary: Option<usize>,
     /// Price of a name: the logarithm of the number of candidates.
     price: f64,
@@ -34,17 +35,15 @@ impl<'e> Sets<'e> {
         let score =
             |evidence: f64, names: usize| evidence / rules.temperature - price * names as f64;
         let ordinary = evidence.found.filter(|&i| {
-            let set = &evidence.tried[i];
-            set.effects.is_empty() && has_skill(evidence, set.replayed, rules)
+            let replayed = evidence.tried[i].replayed;
+            is_ordinary(evidence, i) && has_skill(evidence, replayed, rules)
         });
-        let mut all = vec![Hypothesis {
-            found: ordinary,
-            ..Hypothesis::default()
-        }];
-        let mut scores = vec![ordinary.map_or(0.0, |i| score(evidence.tried[i].evidence, 0))];
+        let mut all = vec![Hypothesis::default()];
+        let mut scores = vec![0.0];
         let mut places = vec![0; evidence.tried.len()];
         let named = evidence.tried.iter().enumerate();
-        for (i, set) in named.filter(|(_, set)| !set.effects.is_empty()) {
+        let named = named.filter(|(i, set)| !set.effects.is_empty() && !is_ordinary(evidence, *i));
+        for (i, set) in named {
             places[i] = all.len();
             all.push(Hypothesis {
                 found: Some(i),
@@ -52,6 +51,15 @@ impl<'e> Sets<'e> {
                 ..Hypothesis::default()
             });
             scores.push(score(set.evidence, set.names));
+        }
+        // With tolerances or without them, what the logs show without a search is one answer.
+        let least = evidence.known.map_or(0, |i| places[i]);
+        for i in (0..places.len()).filter(|&i| is_ordinary(evidence, i)) {
+            places[i] = least;
+        }
+        if let Some(i) = ordinary {
+            all[least].found = ordinary;
+            scores[least] = score(evidence.tried[i].evidence, evidence.tried[i].names);
         }
         Self {
             evidence,

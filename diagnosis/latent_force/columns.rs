@@ -169,7 +169,8 @@ impl Columns {
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
         context.step_error.join(&mut linear, asked.base);
         asked.add_step_error(&context.step_error);
-        let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
+        let assigned = linear.iter_mut().map(|l| std::mem::take(&mut l.assigned));
+        let assigned: Vec<_> = assigned.collect();
         let slopes = linear.iter_mut().map(ForceSlopes::take);
         let slopes: Vec<ForceSlopes> = slopes.collect();
         let carried: Vec<Vec<f64>> = linear
@@ -183,7 +184,7 @@ impl Columns {
             models: &models,
             carried: if one_step { &carried } else { &[] },
             slopes: &slopes,
-            late: &late,
+            assigned: &assigned,
             together: true,
             progress,
         };

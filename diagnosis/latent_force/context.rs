@@ -238,7 +238,6 @@ fn level_blocks(layout: &Layout, forces: &mut [f64]) {
 ///
 /// It is the mean acceleration seen, times the inertia. The inertia follows from the speed that a
 /// force produces over a row (`b`); in segments, from the row where no contact takes the force up.
-/// contact takes it up, times the acceleration seen.
 fn inertial(context: &Context<'_>, trajectory: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<f64> {
     let layout = &context.plant().layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::context::Context;
 use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth};
 use super::step_map::LinearEpisode;
-use super::tangent::{difference, retract};
+use super::tangent::{part_way, retract};
 
 pub use missing::{LEAST_LEFT, Missing, NOTHING};
 
@@ -191,33 +191,27 @@ impl Estimate {
         }
     }
 
-    /// Returns a point part of the way from here to the result of [`Estimate::improve`], `there`.
+    /// Returns a point part of the way from here to the result of one or several
+    /// [improvements](Estimate::improve), `there`.
     #[must_use]
     pub fn towards(&self, context: &Context<'_>, there: &Self, part: f64) -> Self {
         let layout = &context.plant().layout;
-        let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
+        let width = layout.nq + layout.nv;
         let mut out = there.clone();
-        let mut change = vec![0.0; nx];
-        let pairs = out.trajectory.iter_mut().zip(&there.smoothed);
-        for (w, ((states, smoothed), walk)) in pairs.zip(&context.walks).enumerate() {
-            if walk.segment.is_some() {
-                let from = &self.trajectory[w][..width];
-                difference(layout, &states[..width], from, &mut change);
-                change.iter_mut().for_each(|c| *c *= part);
-                states[..width].copy_from_slice(from);
-                retract(layout, &mut states[..width], &change);
-                continue;
-            }
-            let changes = smoothed.change.chunks_exact(nx);
-            for (state, whole) in states.chunks_exact_mut(width).zip(changes) {
-                if whole.iter().all(|x| x.is_finite()) {
-                    for (c, w) in change.iter_mut().zip(whole) {
-                        *c = (part - 1.0) * w;
-                    }
-                    retract(layout, state, &change);
-                }
-            }
+        let pairs = self.trajectory.iter().zip(&mut out.trajectory);
+        for ((from, to), walk) in pairs.zip(&context.walks) {
+            // A segment is replayed from its initial state.
+            let rows = if walk.segment.is_some() {
+                1
+            } else {
+                walk.len()
+            };
+            let each = from.chunks_exact(width).zip(to.chunks_exact_mut(width));
+            each.take(rows)
+                .for_each(|(from, to)| part_way(layout, from, to, part));
         }
+        let pairs = self.read.iter().zip(&mut out.read);
+        pairs.for_each(|(from, to)| part_way(layout, from, to, part));
         let between = |a: &[f64], b: &[f64]| -> Vec<f64> {
             let pairs = a.iter().zip(b);
             pairs

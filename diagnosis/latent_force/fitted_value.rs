@@ -23,7 +23,8 @@ pub struct Unknown {
 impl Unknown {
     /// Returns an unknown for a parameter of the study, centered on the model's own value.
     ///
-    /// Its prior standard deviation is that of a uniform distribution over its range.
+    /// Its prior standard deviation is that of a uniform distribution over its range. One with only
+    /// two values has no derivative and is not fitted: replays choose among the two before the fit.
     #[must_use]
     pub fn of_study(parameter: &Parameter, nominal: f64) -> Self {
         let [low, high] = parameter.range;
@@ -32,7 +33,7 @@ impl Unknown {
             center: nominal,
             deviation: (high - low) / 12.0_f64.sqrt(),
             bounds: [low, high],
-            free: true,
+            free: !parameter.is_binary(),
             is_tolerance: false,
         }
     }

@@ -27,6 +27,7 @@ use super::half_step::step_error;
 use super::left::left;
 use super::picture::forces;
 use super::search::{OpenLoop, Outcome, Set, search};
+use super::segments::firsts;
 use super::selection::gather;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
@@ -113,19 +114,12 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
     found.ok_or_else(|| Error::Failed("no segments were searched".into()))
 }
 
-/// Walks that begin an episode.
-fn firsts(stands: &Stands<'_>) -> Vec<usize> {
-    let walks = stands.context.walks.iter().enumerate();
-    let first = walks.filter(|(_, walk)| walk.rows[0] == 0);
-    first.map(|(w, _)| w).collect()
-}
-
 /// Whether replays of whole logs with the model without effects leave a gap.
 fn leaves_a_gap(null: Null<'_>, stands: &Stands<'_>) -> Result<bool> {
     let replays = Replays {
         bench: null.bench,
         candidates: &[],
-        firsts: &firsts(stands),
+        firsts: &firsts(&stands.context.walks),
         open: Vec::new(),
         progress: null.progress,
     };
@@ -143,7 +137,8 @@ fn searched_in(
     } = null;
     let none = without_steps(null, stands)?;
     let context = &stands.context;
-    let none = led_by_replays(null, context, none, &firsts(stands))?;
+    let firsts = firsts(&context.walks);
+    let none = led_by_replays(null, context, none, &firsts)?;
     progress.end();
     let states = &none.estimate.trajectory;
     let shown = along(bench, &context.walks, &none.theta, states)?;
@@ -152,7 +147,6 @@ fn searched_in(
     let steps = known(shown_steps, &candidates);
     let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
     let offered = (&candidates[..], &members[..]);
-    let firsts = firsts(stands);
     let replays = Replays {
         bench,
         candidates: &candidates,

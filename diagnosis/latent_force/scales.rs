@@ -42,6 +42,9 @@ pub struct Scales {
     /// At common scales of all variances, on all columns; the first has the variances as they are.
     pub common: Vec<Regression>,
     joints: Vec<AtJoint>,
+    /// Columns that reach the only degree of freedom, in ascending order; `None` if there are more,
+    /// or segments. Common scales are its own.
+    alone: Option<Vec<usize>>,
 }
 
 impl Scales {
@@ -65,7 +68,9 @@ impl Scales {
                 columns: own.clone(),
             })
         };
+        let is_alone = context.plant().layout.nv == 1 && !context.has_segments();
         Self {
+            alone: is_alone.then(|| reaching(context, (columns, candidates), 0)),
             common: SCALES.iter().map(at).collect(),
             joints: lacking(context, estimate)
                 .into_iter()
@@ -77,11 +82,9 @@ impl Scales {
     /// Whether some columns, apart from the present model's, all reach one degree of freedom alone.
     #[must_use]
     pub fn at_one_joint(&self, columns: &[usize]) -> bool {
-        let holds = |joint: &AtJoint| {
-            let of_joint = |c: &usize| joint.columns.binary_search(c).is_ok();
-            columns.iter().all(of_joint)
-        };
-        self.joints.iter().any(holds)
+        let holds = |own: &Vec<usize>| columns.iter().all(|c| own.binary_search(c).is_ok());
+        let joints = self.joints.iter().map(|joint| &joint.columns);
+        joints.chain(&self.alone).any(holds)
     }
 
     /// Regressions at common scales, and those on some columns at the scales of one joint.
@@ -92,6 +95,17 @@ impl Scales {
         Self {
             common,
             joints: joints.collect(),
+            alone: None,
+        }
+    }
+
+    /// Regressions at common scales for a machine with one degree of freedom, and the columns that
+    /// reach it.
+    #[cfg(test)]
+    pub fn of_the_only_joint(common: Vec<Regression>, alone: Vec<usize>) -> Self {
+        Self {
+            alone: Some(alone),
+            ..Self::known(common, Vec::new())
         }
     }
 

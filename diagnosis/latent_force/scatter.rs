@@ -39,7 +39,8 @@ const OWN_INTEGRATOR: f64 = 0.3;
 pub struct Scatter {
     /// Directions of each walk; empty for one that is no segment.
     pub directions: Vec<Vec<f64>>,
-    /// Share of the rows in segments whose readings scatter by more than their noise.
+    /// Share of the rows in segments whose readings scatter by more than their noise, among those
+    /// with a reading that counts.
     pub lost: f64,
 }
 
@@ -91,7 +92,7 @@ impl Scatter {
         });
         let directions: Vec<Vec<f64>> = directions.collect();
         Ok(Self {
-            lost: lost(&directions, all.len(), &estimate.noise.r),
+            lost: lost((&directions, all.len()), &here, &estimate.noise.r),
             directions,
         })
     }
@@ -162,16 +163,64 @@ fn scaled(by: f64, mut beyond: Beyond) -> Beyond {
 }
 
 /// Share of the rows of all segments whose readings, of variances `r`, scatter by more than their
-/// noise.
-fn lost(directions: &[Vec<f64>], n: usize, r: &[f64]) -> f64 {
+/// noise, along `n` directions.
+///
+/// Readings that are missing or belong to a lead, and rows without any other, count neither way.
+fn lost((directions, n): (&[Vec<f64>], usize), here: &[LinearEpisode], r: &[f64]) -> f64 {
     let (mut lost, mut rows) = (0_u32, 0_u32);
-    for row in directions.iter().flat_map(|d| d.chunks_exact(n * r.len())) {
-        let each = row.chunks_exact(n).zip(r);
-        let power: f64 = each
-            .map(|(x, r)| x.iter().map(|x| x * x).sum::<f64>() / r)
-            .sum();
-        lost += u32::from(power > r.len() as f64);
-        rows += 1;
+    for (own, here) in directions.iter().zip(here) {
+        let residuals = here.residual.chunks_exact(r.len());
+        for (row, residuals) in own.chunks_exact(n * r.len()).zip(residuals) {
+            let each = row.chunks_exact(n).zip(r).zip(residuals);
+            let (mut power, mut present) = (0.0, 0_u32);
+            for ((x, r), _) in each.filter(|(_, residual)| residual.is_finite()) {
+                power += x.iter().map(|x| x * x).sum::<f64>() / r;
+                present += 1;
+            }
+            lost += u32::from(power > f64::from(present));
+            rows += u32::from(present > 0);
+        }
     }
     f64::from(lost) / f64::from(rows.max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of a segment, and their directions: one, of three deviations of either reading.
+    const ROWS: usize = 10;
+    const ALONG: [f64; 2] = [3e-3, 0.3];
+    /// Variances of the readings.
+    const R: [f64; 2] = [1e-6, 1e-2];
+
+    /// Share of the rows that are lost if some readings are missing.
+    fn lost_without(is_missing: impl Fn(usize, usize) -> bool) -> f64 {
+        let or = |at: usize, missing: f64, read: f64| {
+            let is_missing = is_missing(at / 2, at % 2);
+            if is_missing { missing } else { read }
+        };
+        let here = LinearEpisode {
+            rows: ROWS,
+            residual: (0..2 * ROWS).map(|at| or(at, f64::NAN, 0.1)).collect(),
+            ..LinearEpisode::default()
+        };
+        // The directions of missing readings are zero.
+        let along = |at: usize| or(at, 0.0, ALONG[at % 2]);
+        let segment: Vec<f64> = (0..2 * ROWS).map(along).collect();
+        // The second walk is no segment.
+        lost((&[segment, Vec::new()], 1), &[here.clone(), here], &R)
+    }
+
+    /// Symptom: replays of a puck that scattered in every row in which a camera saw the puck counted
+    /// as repeatable. Cause: rows without a reading counted as rows that repeat.
+    #[test]
+    fn the_share_of_lost_rows_is_that_of_the_rows_with_a_reading() {
+        assert_eq!(lost_without(|_, _| false), 1.0);
+        assert_eq!(lost_without(|k, s| k % 3 != 0 && s == 1), 1.0);
+        // A lead of four rows, and rows without any reading.
+        assert_eq!(lost_without(|k, _| k < 4), 1.0);
+        assert_eq!(lost_without(|k, _| k % 3 != 0), 1.0);
+        assert_eq!(lost_without(|_, _| true), 0.0);
+    }
 }

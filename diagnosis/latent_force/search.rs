@@ -2,6 +2,8 @@
 
 mod about_replays;
 mod begun;
+#[cfg(test)]
+pub mod by_hand;
 mod by_replays;
 mod confused;
 mod due;
@@ -13,6 +15,7 @@ mod given_back;
 mod line;
 mod line_fit;
 mod measure;
+mod names;
 mod open_loop;
 mod path;
 mod prior;
@@ -36,11 +39,12 @@ use super::context::Context;
 use super::estimate::Missing;
 use super::fit::Fitted;
 
+pub use names::Names;
 pub use open_loop::OpenLoop;
 pub use prior::log_prior;
 pub use round::{Round, Seen};
 pub use screening::Sight;
-pub use set::{Set, labels_of, name_of};
+pub use set::{Set, labels_of, name_of, refined_by};
 pub use tolerances::Tolerances;
 
 use path::Path;

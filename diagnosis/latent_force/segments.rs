@@ -28,7 +28,7 @@ const BETWEEN: f64 = 0.5;
 /// Time that a segment runs before its readings count, s: five time constants of a contact.
 const LEAD: f64 = 0.1;
 /// Time about a row with contact that counts as contact too, s: readings are noisy, and a bounce is
-/// shorter than a row.
+/// shorter than a row. The neighbouring rows always count: a replay leads from one row to the next.
 const ABOUT: f64 = 0.1;
 /// Fewest rows of a segment that count.
 const FEWEST: usize = 4;
@@ -46,7 +46,7 @@ pub fn cut(walk: &Walk, touches: &[bool], duration: f64) -> Vec<Walk> {
         let time = walk.time[k];
         let first = walk.time.partition_point(|t| *t < time - ABOUT);
         let last = walk.time.partition_point(|t| *t <= time + ABOUT);
-        near[first..last].fill(true);
+        near[first.min(k.saturating_sub(1))..last.max(k + 2).min(n)].fill(true);
     }
     let runs = merged(walk, runs_of(&near));
     let mut out = Vec::new();
@@ -68,6 +68,15 @@ pub fn whole(walk: &Walk, touches: &[bool]) -> Walk {
         walk.segment = Some(0);
     }
     walk
+}
+
+/// Returns the walks that begin an episode, one for each episode.
+///
+/// A later segment may begin at the first row too, for its lead.
+#[must_use]
+pub fn firsts(walks: &[Walk]) -> Vec<usize> {
+    let begins = |&w: &usize| w == 0 || walks[w].episode != walks[w - 1].episode;
+    (0..walks.len()).filter(begins).collect()
 }
 
 type Run = (std::ops::Range<usize>, bool);
@@ -99,22 +108,39 @@ fn merged(walk: &Walk, runs: Vec<Run>) -> Vec<Run> {
 
 /// Cuts some rows into segments of about equal duration.
 fn segments(walk: &Walk, range: std::ops::Range<usize>, duration: f64, out: &mut Vec<Walk>) {
-    let rows = range.len();
-    let seconds = walk.time[range.end - 1] - walk.time[range.start];
-    let pieces = (seconds / duration).round() as usize;
-    let pieces = pieces.clamp(1, (rows / FEWEST).max(1));
-    for i in 0..pieces {
-        let first = range.start + i * rows / pieces;
-        let end = range.start + (i + 1) * rows / pieces;
+    let ends = pieces(&walk.time[range.clone()], duration);
+    for pair in ends.windows(2) {
+        let (first, end) = (range.start + pair[0], range.start + pair[1]);
         let begin = walk.time[first] - LEAD;
         let lead = walk.time[..first].partition_point(|t| *t < begin - 1e-9);
-        if end - lead < 2 {
-            continue;
-        }
         let mut part = walk.part(lead..end);
         part.segment = Some(first - lead);
         out.push(part);
     }
+}
+
+/// Cuts rows at some times, s, into pieces of about a duration, s; returns the first row of each,
+/// and last the number of rows.
+///
+/// No piece has fewer than [`FEWEST`] rows, unless there are fewer. So pieces are longer where rows
+/// are missing.
+fn pieces(time: &[f64], duration: f64) -> Vec<usize> {
+    let rows = time.len();
+    let seconds = time[rows - 1] - time[0];
+    let n = (seconds / duration).round() as usize;
+    let n = n.clamp(1, (rows / FEWEST).max(1));
+    // The last row lasts as long as the mean of the others.
+    let whole = seconds * rows as f64 / rows.saturating_sub(1).max(1) as f64;
+    let mut firsts = vec![0];
+    for i in 1..n {
+        let begin = time[0] + whole * i as f64 / n as f64;
+        let first = time.partition_point(|t| *t <= begin + 1e-9) - 1;
+        if first >= firsts[firsts.len() - 1] + FEWEST && first + FEWEST <= rows {
+            firsts.push(first);
+        }
+    }
+    firsts.push(rows);
+    firsts
 }
 
 #[cfg(test)]
@@ -188,5 +214,70 @@ mod tests {
         let parts = cut(&walk, &touches, f64::INFINITY);
         assert_eq!(parts.len(), 3);
         assert_eq!(counted(&parts[1]), 140..240);
+    }
+
+    /// Whether every row counts in one walk, in order, and every walk can be replayed.
+    #[track_caller]
+    fn assert_covers(walk: &Walk, parts: &[Walk]) {
+        let mut next = 0;
+        for part in parts {
+            assert_eq!(counted(part).start, next);
+            next = counted(part).end;
+            assert!(part.len() > 1 && part.substeps.len() + 1 == part.len());
+        }
+        assert_eq!(next, walk.len());
+        assert_eq!(firsts(parts), [0]);
+        assert_eq!(parts[0].rows[0], 0);
+    }
+
+    fn at(time: Vec<f64>) -> Walk {
+        Walk {
+            rows: (0..time.len()).collect(),
+            substeps: vec![5; time.len() - 1],
+            time,
+            ..walk(2)
+        }
+    }
+
+    /// Symptom: a panic, "range end index 1 out of range for slice of length 0". Cause: a single
+    /// row of contact can be no segment and was left out. If it was the first row, no walk began
+    /// the episode.
+    #[test]
+    fn a_single_row_of_contact_is_a_segment_with_its_neighbours() {
+        // A message that was sent once, half a second before the others.
+        let early = |k: usize| if k == 0 { 0.0 } else { 0.49 + 0.01 * k as f64 };
+        let walk = at((0..200).map(early).collect());
+        let first: Vec<bool> = (0..200).map(|k| k == 0).collect();
+        let parts = cut(&walk, &first, 0.25);
+        assert_covers(&walk, &parts);
+        assert_eq!(counted(&parts[0]), 0..2);
+        // 5 Hz, and contact in any one row.
+        let walk = at((0..20).map(|k| 0.2 * f64::from(k)).collect());
+        for touching in 0..20 {
+            let touches: Vec<bool> = (0..20).map(|k| k == touching).collect();
+            assert_covers(&walk, &cut(&walk, &touches, 0.25));
+        }
+    }
+
+    /// Symptom: logs were replayed from the state of another log. Cause: where rows are missing,
+    /// pieces were far shorter than a segment, and the lead of the second one began at the first
+    /// row as well.
+    #[test]
+    fn one_walk_begins_an_episode_however_its_rows_are_spaced() {
+        let time = |k: usize| 0.01 * k as f64 + if k < 30 { 0.0 } else { 2.0 };
+        let walk = at((0..60).map(time).collect());
+        let parts = cut(&walk, &[true; 60], 0.25);
+        assert_covers(&walk, &parts);
+        assert_eq!(parts.iter().filter(|p| p.rows[0] == 0).count(), 1);
+        // Two walks of the later episode begin at its first row.
+        let mut walks = vec![parts[0].clone(); 3];
+        walks[0].episode = 4;
+        assert_eq!(firsts(&walks), [0, 1]);
+        for duration in DURATIONS {
+            for touching in 0..60 {
+                let touches: Vec<bool> = (0..60).map(|k| k >= touching).collect();
+                assert_covers(&walk, &cut(&walk, &touches, duration));
+            }
+        }
     }
 }

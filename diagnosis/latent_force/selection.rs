@@ -1,5 +1,7 @@
 //! Collects the evidence for the decision from a search by the missing force.
 
+use std::collections::BTreeSet;
+
 use asid_core::{Progress, Result};
 use asid_mjcf::Plant;
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
@@ -14,7 +16,7 @@ use crate::fit::cost;
 use crate::skill::about_the_mean;
 
 use super::estimate::{LEAST_LEFT, NOTHING};
-use super::search::{Outcome, Set, labels_of, log_prior};
+use super::search::{Outcome, Set, labels_of, log_prior, refined_by};
 
 /// Largest number of screened, unfitted sets that are kept: those further behind have a negligible
 /// probability.
@@ -35,44 +37,54 @@ fn replayed(bench: &Bench, of: &Explanation, held_out: f64) -> Replayed {
     }
 }
 
-/// Sets that were screened upon a base and never fitted.
+/// Sets that were screened upon a base and never fitted, in any round.
 ///
 /// Their evidence is relative to the model without effects, to first order, and includes prior
-/// odds.
+/// odds. As all fitted sets do, they contain the `known` candidates.
 fn screened(
     plant: &Plant,
     outcome: &Outcome,
-    candidates: &[Candidate],
+    (candidates, known): (&[Candidate], &[usize]),
     tried: &[Tried],
 ) -> Vec<Screened> {
     let none = outcome.none.evidence;
+    let effects = |set: &[usize]| {
+        let others = set.iter().filter(|c| !known.contains(c));
+        let all: Vec<usize> = others.chain(known).copied().collect();
+        labels(candidates, &all)
+    };
+    let confirmed = || outcome.rounds.iter().flat_map(|r| &r.confirmed);
+    let raced = outcome.rounds.iter().flat_map(|r| &r.raced);
+    let mut fitted: BTreeSet<Vec<String>> = raced.map(|set| effects(set)).collect();
+    fitted.extend(confirmed().map(|set| effects(&set.candidates)));
+    fitted.extend(tried.iter().map(|t| t.effects.clone()));
     let mut all: Vec<Screened> = Vec::new();
     for round in &outcome.rounds {
         // The fitted base: the model without effects, or a set of an earlier round.
-        let sets = outcome.rounds.iter().flat_map(|r| &r.confirmed);
-        let of_base = sets.clone().filter(|s| s.candidates == round.base);
-        let base = of_base.map(|s| (s.fitted.evidence, s.names)).next();
-        let (evidence, names) = if round.base.is_empty() {
-            (none, 0)
-        } else {
-            base.unwrap_or((none, 0))
+        let own = |set: &Set| -> Vec<usize> {
+            let own = set.candidates.iter().filter(|c| !known.contains(c));
+            own.copied().collect()
         };
-        let raced: Vec<Vec<String>> = round.raced.iter().map(|s| labels(candidates, s)).collect();
+        let base = confirmed().find(|set| own(set) == round.base);
+        let evidence = base.map_or(none, |set| set.fitted.evidence);
+        let prior = log_prior(plant, candidates, &[&round.base[..], known].concat());
         for seen in &round.screened {
-            let members: Vec<usize> = round.base.iter().chain(&seen.set).copied().collect();
-            let effects = labels(candidates, &members);
-            if raced.contains(&effects) {
-                continue;
-            }
+            // A finer law takes the place of the simpler one.
+            let finer = seen.set.iter();
+            let simpler: Vec<usize> = finer.filter_map(|&c| refined_by(candidates, c)).collect();
+            let stay = round.base.iter().filter(|c| !simpler.contains(c));
+            let stay: Vec<usize> = stay.chain(known).copied().collect();
+            let names = base.map_or(0, |set| set.names.among(&stay).count());
             all.push(Screened {
-                effects,
+                effects: effects(&[&stay[..], &seen.set].concat()),
                 names: names + seen.names,
-                evidence: evidence - none + seen.gain + log_prior(plant, candidates, &round.base),
+                evidence: evidence - none + seen.gain + prior,
             });
         }
     }
-    all.retain(|s| !tried.iter().any(|t| t.effects == s.effects));
     all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    // Of sets with the same effects the most evident one is kept.
+    all.retain(|s| fitted.insert(s.effects.clone()));
     all.truncate(SCREENED);
     all
 }
@@ -100,7 +112,7 @@ pub fn gather(
             let prior = log_prior(plant, candidates, &set.candidates);
             Tried {
                 effects: labels(candidates, &set.candidates),
-                names: set.names,
+                names: set.names.count(),
                 evidence: set.fitted.evidence - outcome.none.evidence + prior,
                 prior,
                 replayed: replayed(bench, &found.explanation, found.explanation.held_out),
@@ -150,7 +162,7 @@ pub fn gather(
             held_out: about_the_mean(&bench.test.logs),
         },
         repeatable: !findings.repeats.is_some_and(|r| r.scatters),
-        screened: screened(plant, outcome, candidates, &tried),
+        screened: screened(plant, outcome, (candidates, known), &tried),
         tried,
         found,
         known: place(known).filter(|_| !known.is_empty()),
@@ -159,4 +171,83 @@ pub fn gather(
         left: after.relative_to(before),
         stopped,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::tests::plant;
+    use crate::latent_force::search::by_hand::{candidate, outcome, round, set};
+
+    /// Dry friction, friction that falls with the speed, viscous friction, a bias, and steps.
+    fn candidates() -> Vec<Candidate> {
+        let labels = [
+            "coulomb-friction@slide",
+            "stribeck-friction@slide",
+            "viscous-friction@slide",
+            "sensor-bias@place",
+            "sensor-quantization@place",
+        ];
+        labels.map(candidate).into()
+    }
+
+    /// Symptom: sets that were fitted had a share of the probability as sets that never were, one of
+    /// them with dry friction beside the law that refines it. Cause: a screened set was compared
+    /// with the fits of its own round, and the finer law was added to the simpler one.
+    #[test]
+    fn what_was_fitted_in_any_round_is_not_told_as_screened_only() {
+        let candidates = candidates();
+        let fitted = |names: &[&[usize]], evidence| set(&candidates, (names, &[]), evidence);
+        let [dry, bias, both] = [
+            fitted(&[&[0]], 50.0),
+            fitted(&[&[3]], 40.0),
+            fitted(&[&[0], &[2]], 57.0),
+        ];
+        let rounds = vec![
+            round(
+                &[],
+                &[(&[0], 50.0), (&[2], 20.0), (&[0, 2], 60.0)],
+                (&[&[0], &[2]], vec![dry, bias]),
+            ),
+            round(
+                &[0],
+                &[(&[1], 5.0), (&[2], 8.0), (&[3], 3.0)],
+                (&[&[1]], vec![both.clone()]),
+            ),
+            round(&[3], &[(&[0], 10.0)], (&[], Vec::new())),
+        ];
+        let found = screened(&plant(), &outcome(rounds, both), (&candidates, &[]), &[]);
+        // Two rounds saw the same set, once with less evidence.
+        let [rest] = &found[..] else {
+            panic!("{found:?}")
+        };
+        assert_eq!(
+            rest.effects,
+            ["coulomb-friction@slide", "sensor-bias@place"]
+        );
+        assert_eq!((rest.names, rest.evidence), (2, 53.0));
+    }
+
+    /// Symptom: beside the steps of an encoder, sets that were screened later lost the evidence of
+    /// their base. Cause: every fitted set has the steps, and the base of a round does not.
+    #[test]
+    fn screened_sets_have_the_known_steps_as_fitted_ones_do() {
+        let candidates = candidates();
+        let fitted = |names: &[&[usize]], evidence| set(&candidates, (names, &[]), evidence);
+        let [dry, steps] = [fitted(&[&[0], &[4]], 850.0), fitted(&[&[4]], 800.0)];
+        let rounds = vec![
+            round(
+                &[],
+                &[(&[0], 50.0), (&[2], 20.0)],
+                (&[&[0]], vec![dry.clone(), steps]),
+            ),
+            round(&[0], &[(&[3], 3.0)], (&[], Vec::new())),
+        ];
+        let found = screened(&plant(), &outcome(rounds, dry), (&candidates, &[4]), &[]);
+        let told: Vec<(usize, usize, f64)> = found
+            .iter()
+            .map(|s| (s.effects.len(), s.names, s.evidence))
+            .collect();
+        assert_eq!(told, [(3, 3, 853.0), (2, 2, 820.0)]);
+    }
 }

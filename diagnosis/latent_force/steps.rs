@@ -12,7 +12,7 @@ use crate::data::Logs;
 use crate::noise;
 
 use super::columns::Form;
-use super::search::{Outcome, Round, Set, Sight};
+use super::search::{Names, Outcome, Round, Set, Sight};
 
 /// Steps are an effect if the standard deviation of the rounding is this multiple of the sensor's
 /// noise.
@@ -144,14 +144,14 @@ pub fn beside(mut outcome: Outcome, known: &[Known], candidates: &[Candidate]) -
             fitted.theta.push(one.step);
             fitted.evidence += one.gain;
             set.candidates.push(one.candidate);
-            set.names += 1;
+            set.names.add(vec![one.candidate]);
         }
         set
     };
     let alone = with(&Set {
         candidates: Vec::new(),
         fitted: outcome.none.clone(),
-        names: 0,
+        names: Names::default(),
     });
     for set in outcome.rounds.iter_mut().flat_map(|r| &mut r.confirmed) {
         *set = with(set);

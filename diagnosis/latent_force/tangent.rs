@@ -8,7 +8,7 @@ use asid_core::layout::{JointKind, Layout};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// Index of a joint's quaternion in `qpos` and of its angular velocity in `qvel`, if it has one.
-fn rotation(joint: &asid_core::layout::Joint) -> Option<(usize, usize)> {
+pub(crate) fn rotation(joint: &asid_core::layout::Joint) -> Option<(usize, usize)> {
     match joint.kind {
         JointKind::Free => Some((joint.qpos + 3, joint.qvel + 3)),
         JointKind::Ball => Some((joint.qpos, joint.qvel)),
@@ -63,6 +63,15 @@ pub fn difference(layout: &Layout, a: &[f64], b: &[f64], out: &mut [f64]) {
     }
 }
 
+/// Moves state `to` back until it is only `part` of the way from state `from`.
+pub fn part_way(layout: &Layout, from: &[f64], to: &mut [f64], part: f64) {
+    let mut change = vec![0.0; 2 * layout.nv];
+    difference(layout, to, from, &mut change);
+    change.iter_mut().for_each(|c| *c *= part);
+    to.copy_from_slice(from);
+    retract(layout, to, &change);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,6 +117,22 @@ mod tests {
         difference(&layout, &moved, &state, &mut back);
         for (a, b) in back.iter().zip(&change) {
             assert!((a - b).abs() < 1e-12, "{back:?}");
+        }
+    }
+
+    #[test]
+    fn a_part_of_the_way_is_that_part_of_the_change() {
+        let layout = layout();
+        let mut from = vec![0.0; 22];
+        (from[4], from[8]) = (1.0, 1.0);
+        let change: Vec<f64> = (0..20).map(|i| 0.3 - 0.04 * f64::from(i)).collect();
+        let mut to = from.clone();
+        retract(&layout, &mut to, &change);
+        part_way(&layout, &from, &mut to, 0.25);
+        let mut part = vec![0.0; 20];
+        difference(&layout, &to, &from, &mut part);
+        for (part, whole) in part.iter().zip(&change) {
+            assert!((part - 0.25 * whole).abs() < 1e-12, "{part}");
         }
     }
 

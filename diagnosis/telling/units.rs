@@ -40,14 +40,15 @@ impl<'s> Site<'s> {
 
     /// Returns the unit at this site of a value whose unit a catalogue declares.
     fn unit(&self, declared: &str) -> String {
-        if let Some(unit) = self.reading {
-            let [one, many] = OF_READING;
-            return declared.replace(many, unit).replace(one, unit);
-        }
+        let [one, many] = OF_READING;
+        let declared = match self.reading {
+            Some(unit) => declared.replace(many, unit).replace(one, unit),
+            None => declared.to_owned(),
+        };
         match self.joint {
-            Some(JointKind::Hinge) => one_of(declared, true),
-            Some(JointKind::Slide) => one_of(declared, false),
-            _ => declared.to_owned(),
+            Some(JointKind::Hinge) => one_of(&declared, true),
+            Some(JointKind::Slide) => one_of(&declared, false),
+            _ => declared,
         }
     }
 }
@@ -128,5 +129,17 @@ mod tests {
             "rad per second"
         );
         assert_eq!(site.unit("1"), "1");
+    }
+
+    /// Symptom: a friction at a hinge was told in `N m or N`. Cause: the hinge's encoder has its
+    /// name, and the site counted as a sensor only.
+    #[test]
+    fn a_joint_with_the_name_of_its_encoder_has_the_units_of_both() {
+        let site = Site {
+            joint: Some(JointKind::Hinge),
+            reading: Some("rad"),
+        };
+        assert_eq!(site.unit("N m or N"), "N m");
+        assert_eq!(site.unit(OF_READING[0]), "rad");
     }
 }

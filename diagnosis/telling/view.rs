@@ -107,6 +107,7 @@ impl Telling<'_> {
         unread: &mut Vec<String>,
     ) -> Result<Vec<Motion>> {
         let bench = self.bench;
+        let log = &logs.episodes[episode];
         let mut motions = Vec::new();
         for (seen, start) in models.iter().zip(starts) {
             let Some(start) = start else { continue };
@@ -114,11 +115,10 @@ impl Telling<'_> {
                 theta: seen.theta.to_vec(),
                 starts: vec![(*start).clone()],
             };
-            let plan = &logs.episodes[episode].plan;
-            let qpos = positions(&*seen.model, &bench.parameters, plan, &point)?;
+            let of_log = (&log.plan, log.number);
+            let qpos = positions(&*seen.model, &bench.parameters, of_log, &point)?;
             motions.push(Motion::new(seen.origin, seen.label, qpos));
         }
-        let log = &logs.episodes[episode];
         let of_log = motions.last().and_then(|last| {
             let rows = log.episode.rows().min(log.plan.rows());
             logged::positions(&bench.machine.plant, &log.episode.part(0..rows), &last.qpos)

@@ -8,6 +8,7 @@
 
 use asid_core::Result;
 
+use crate::data::Logs;
 use crate::latent_force::context::Context;
 use crate::latent_force::walk::Walk;
 
@@ -25,7 +26,8 @@ pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {
     if !context.has_segments() || n < EVERY * FEWEST {
         return [(0..n).collect(), Vec::new()];
     }
-    let motion: Vec<f64> = context.walks.iter().map(|w| motion(context, w)).collect();
+    let walks = context.walks.iter();
+    let motion: Vec<f64> = walks.map(|w| motion(context.logs, w)).collect();
     let first = most_of_each(&motion);
     let others = (0..n).filter(|w| !first.contains(w));
     [first.clone(), others.collect()]
@@ -34,19 +36,24 @@ pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {
 /// Returns a measure of the motion along a walk: the sum, over all entries of a reading, of the
 /// logarithm of their variance in units of the noise.
 ///
-/// The logarithm lets an object that moves a little count beside one that moves much.
-fn motion(context: &Context<'_>, walk: &Walk) -> f64 {
-    let logs = context.logs;
+/// The logarithm lets an object that moves a little count beside one that moves much. Sensors have
+/// rates of their own, so each reading is compared with the first one of its channel.
+fn motion(logs: &Logs, walk: &Walk) -> f64 {
     let width = logs.width();
     let readings = &logs.episodes[walk.episode].readings;
     let row = |k: usize| &readings[k * width..(k + 1) * width];
     let rows = &walk.rows[walk.segment.unwrap_or(0)..];
+    let mut first = vec![f64::NAN; width];
+    for &k in rows {
+        let missing = first.iter_mut().zip(row(k)).filter(|(f, _)| f.is_nan());
+        missing.for_each(|(first, x)| *first = *x);
+    }
     let noise = logs.entry_noise();
     let mut differ = vec![0.0; noise.len()];
     // Rows, sum and sum of squares of each entry.
     let mut sums = vec![[0.0_f64; 3]; noise.len()];
     for &k in rows {
-        logs.reading_difference(row(k), row(rows[0]), &mut differ);
+        logs.reading_difference(row(k), &first, &mut differ);
         for (sums, x) in sums.iter_mut().zip(&differ).filter(|(_, x)| x.is_finite()) {
             sums[0] += 1.0;
             sums[1] += x;
@@ -95,7 +102,7 @@ pub(super) fn along(
     let own = Source {
         carried: &some(source.carried, which),
         slopes: &some(source.slopes, which),
-        late: &some(source.late, which),
+        assigned: &some(source.assigned, which),
         ..*source
     };
     let (found, complete) = own.columns(&part, &some(states, which), wanted)?;
@@ -157,7 +164,49 @@ impl Columns {
 
 #[cfg(test)]
 mod tests {
+    use asid_core::episode::ChannelColumns;
+    use asid_core::{Episode, Scene};
+    use asid_mjcf::Plant;
+
     use super::*;
+
+    /// Motion along ten rows in which a cart moves by `step`, m, per row; its camera, with a noise of
+    /// 1 m, sees it in some of them.
+    fn motion_seen_in(step: f64, is_seen: impl Fn(usize) -> bool) -> f64 {
+        let scene = r#"<mujoco><worldbody><body name="cart">
+            <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
+            <sensor><framepos name="camera" objtype="xbody" objname="cart"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap()).unwrap();
+        let reading = |k: usize| {
+            let place = [step * k as f64, 0.0, 0.0];
+            if is_seen(k) { place } else { [f64::NAN; 3] }
+        };
+        let episode = Episode {
+            time: (0..10).map(|k| 0.01 * f64::from(k)).collect(),
+            channels: vec![ChannelColumns {
+                name: "camera".into(),
+                len: 3,
+            }],
+            readings: (0..10).flat_map(reading).collect(),
+            ..Episode::default()
+        };
+        let named = vec![("log".into(), episode)];
+        let logs = Logs::new(&plant, &["camera".to_owned()], named).unwrap();
+        motion(&logs, &Walk::new(&logs, 0, plant.layout.timestep))
+    }
+
+    /// Symptom: laws of a puck were screened where it lay still. Cause: a segment in whose first
+    /// row the camera had no reading counted as one without motion.
+    #[test]
+    fn a_motion_is_seen_whichever_row_is_read_first() {
+        // Variance of ten evenly spaced places.
+        let all = (30.0_f64.powi(2) * 8.25).ln_1p();
+        assert!((motion_seen_in(30.0, |_| true) - all).abs() < 1e-9);
+        let some = motion_seen_in(30.0, |k| k % 3 == 1);
+        assert!((some - all).abs() < 1.0, "{some} instead of {all}");
+        assert_eq!(motion_seen_in(0.0, |k| k % 3 == 1), 0.0);
+        assert_eq!(motion_seen_in(30.0, |_| false), 0.0);
+    }
 
     #[test]
     fn of_each_three_it_is_that_along_which_most_moves() {

@@ -134,7 +134,7 @@ pub(super) fn sizes(
         models: source.models,
         carried: &carried,
         slopes: &slopes,
-        late: &[],
+        assigned: &[],
         // A parameter without effect has no size, so nothing of another column may leak into its
         // column.
         together: false,

@@ -72,8 +72,9 @@ pub(super) struct Source<'s> {
     pub(super) carried: &'s [Vec<f64>],
     /// Derivatives with respect to forces, one per walk.
     pub(super) slopes: &'s [ForceSlopes],
-    /// Delay of the readings in the present model.
-    pub(super) late: &'s [Vec<f64>],
+    /// [`LinearEpisode::assigned`](crate::latent_force::step_map::LinearEpisode::assigned) of each
+    /// walk in the present model.
+    pub(super) assigned: &'s [Vec<Option<usize>>],
     /// Whether effects on the motion share runs of the engine, separated to a few percent of the
     /// largest column of a run.
     ///
@@ -221,9 +222,8 @@ impl Source<'_> {
         let mut accounts = vec![Account::default(); own];
         let mut change = vec![0.0; nx.max(ns)];
         for (w, mut linear) in found.into_iter().enumerate() {
-            if let Some(late) = self.late.get(w).filter(|l| !l.is_empty()) {
-                let time = &context.walks[w].time;
-                retime_columns(&mut linear.reading_columns, time, late, own);
+            if let Some(assigned) = self.assigned.get(w) {
+                retime_columns(&mut linear.reading_columns, assigned, ns, own);
             }
             let (to_states, to_readings) = &mut out[w];
             // A segment has no state columns, only columns of its readings.

@@ -7,14 +7,59 @@
 //! where the model's readings change, the initial states that leave the readings unchanged are
 //! tried in addition to those that derivatives suggest.
 
-use asid_core::Result;
+use asid_core::{Layout, Result};
 
 use crate::latent_force::context::Context;
 use crate::latent_force::initial::position_entries;
 use crate::latent_force::step_map::StepMap;
-use crate::latent_force::tangent::{difference, retract};
+use crate::latent_force::tangent::{difference, retract, rotation};
 
 use super::Estimate;
+
+/// Least response of a reading to its position, relative to that of a sensor without error, that a
+/// step may rely on. A sensor's scale is 0.3 at least; one that responds less is stuck.
+const LEAST_RESPONSE: f64 = 0.1;
+
+/// Returns by how much each position reads more at some states than the given model reads at the
+/// segments' own, `nx` per walk; 0 for coordinates that no sensor reads directly.
+fn misread(
+    context: &Context<'_>,
+    map: &mut StepMap<'_>,
+    theta: &[f64],
+    states: &[Vec<f64>],
+) -> Result<Vec<Vec<f64>>> {
+    let entries = position_entries(context.plant(), context.logs);
+    let mut differ = vec![0.0; context.logs.entries.len()];
+    let now = map.readings_at(theta, states)?;
+    let each = now.iter().zip(&context.as_read).map(|(now, as_given)| {
+        context.logs.reading_difference(now, as_given, &mut differ);
+        let off = entries.iter().map(|entry| entry.map_or(0.0, |e| differ[e]));
+        let mut off: Vec<f64> = off.collect();
+        off.resize(2 * entries.len(), 0.0);
+        off
+    });
+    Ok(each.collect())
+}
+
+/// Returns the change of a position that makes up for a reading that is `off`, of which a change by
+/// `-off` leaves `left`.
+///
+/// It is a step of the secant method, which is exact for a bias and a scale.
+fn made_up(off: f64, left: f64) -> f64 {
+    let response = (off - left) / off;
+    if response.is_finite() && response > LEAST_RESPONSE {
+        -off / response
+    } else {
+        -off
+    }
+}
+
+/// Moves a state by a change, unless a reading failed.
+fn retract_finite(layout: &Layout, state: &mut [f64], change: &[f64]) {
+    if change.iter().all(|x| x.is_finite()) {
+        retract(layout, state, change);
+    }
+}
 
 impl Estimate {
     /// Updates the segments' initial states according to their readings, so that the model at given
@@ -33,19 +78,26 @@ impl Estimate {
         let layout = &context.plant().layout;
         let mut read = context.read.clone();
         if map.has_segments() && map.alters_readings() {
-            let entries = position_entries(context.plant(), context.logs);
-            let now = map.readings_at(theta, &context.read)?;
-            let mut differ = vec![0.0; context.logs.entries.len()];
-            let mut change = vec![0.0; 2 * layout.nv];
-            let each = now.iter().zip(&context.as_read).zip(&mut read);
-            for ((now, as_given), state) in each {
-                context.logs.reading_difference(now, as_given, &mut differ);
-                for (change, entry) in change.iter_mut().zip(&entries) {
-                    *change = entry.map_or(0.0, |e| -differ[e]);
-                }
-                if change.iter().all(|x| x.is_finite()) {
-                    retract(layout, state, &change);
-                }
+            let before = misread(context, map, theta, &read)?;
+            let mut tried = read.clone();
+            for (state, off) in tried.iter_mut().zip(&before) {
+                let change: Vec<f64> = off.iter().map(|off| -off).collect();
+                retract_finite(layout, state, &change);
+            }
+            let after = misread(context, map, theta, &tried)?;
+            // Turns about several axes do not add up, and no effect scales an orientation.
+            let turns = |i: usize| {
+                let mut joints = layout.joints.iter().filter_map(rotation);
+                joints.any(|(_, dof)| (dof..dof + 3).contains(&i))
+            };
+            for ((state, before), after) in read.iter_mut().zip(&before).zip(&after) {
+                let each = before.iter().zip(after).enumerate();
+                let change = each.map(|(i, (off, left))| {
+                    let left = if turns(i) { 0.0 } else { *left };
+                    made_up(*off, left)
+                });
+                let change: Vec<f64> = change.collect();
+                retract_finite(layout, state, &change);
             }
         }
         let pairs = read.iter().zip(&self.read);
@@ -82,5 +134,30 @@ impl Estimate {
         }
         let most: Vec<Option<f64>> = left.iter().map(|left| Some(*left)).collect();
         self.take_better(map, theta, (other, &most), left)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Change of a position of which its sensor reads as much as 0.5 m reads to one without error.
+    fn found(reads: impl Fn(f64) -> f64) -> f64 {
+        let off = reads(0.5) - 0.5;
+        0.5 + made_up(off, reads(0.5 - off) - 0.5)
+    }
+
+    /// Symptom: the prior of a segment's initial state contradicted the true scale of an encoder by
+    /// several deviations. Cause: a step to first order, `(2 - s) x` in place of `x / s`.
+    #[test]
+    fn a_position_that_reads_the_same_is_found_for_a_bias_and_a_scale() {
+        for scale in [0.3, 0.7, 1.1, 1.3, 2.0, 3.0] {
+            let at = found(|x| scale * x + 0.1);
+            assert!((at - 0.4 / scale).abs() < 1e-12, "{scale}: {at}");
+        }
+        assert!((found(|x| x + 0.04) - 0.46).abs() < 1e-12);
+        assert_eq!(found(|x| x), 0.5);
+        // A sensor that is stuck at 0.6 m shows no position: the step is that of a bias.
+        assert!((found(|_| 0.6) - 0.4).abs() < 1e-12);
     }
 }

@@ -5,8 +5,11 @@
 //! friction is. Segments of such a model begin where that friction has put the bodies. Replays of
 //! whole logs do show it. So each parameter begins at the one of a few values over its range whose
 //! replays leave least.
+//!
+//! A parameter of two values has no derivative at all. Replays choose its value, with and without
+//! contact, and no fit moves it.
 
-use asid_core::Result;
+use asid_core::{Parameter, Result};
 
 use crate::bench::Bench;
 use crate::fit::cost;
@@ -18,20 +21,30 @@ use super::rows::Rows;
 /// derivatives reach about a tenth of a range.
 const TRIED: usize = 5;
 
-/// Values to begin with: `nominal` if no bodies touch.
+/// Values of a parameter that are tried: the only two that it has, or some over its range.
+fn others(parameter: &Parameter) -> impl Iterator<Item = f64> {
+    let n = if parameter.is_binary() { 2 } else { TRIED };
+    (0..n).map(move |k| parameter.from_unit((k as f64 + 0.5) / n as f64))
+}
+
+/// Values to begin with: `nominal` if no bodies touch, except for parameters of two values.
 ///
 /// # Errors
 /// When a rollout fails.
 pub(super) fn begin_values(bench: &Bench, rows: &Rows, nominal: &[f64]) -> Result<Vec<f64>> {
     let mut values = nominal.to_vec();
-    if !rows.touches() || values.is_empty() {
+    let all = bench.parameters.iter().enumerate();
+    let open: Vec<_> = all
+        .filter(|(_, p)| rows.touches() || p.is_binary())
+        .collect();
+    if open.is_empty() {
         return Ok(values);
     }
     let mut predictor = bench.predictor(&[], &bench.train)?;
-    for (i, parameter) in bench.parameters.iter().enumerate() {
-        let places = (0..TRIED).map(|k| (k as f64 + 0.5) / TRIED as f64);
-        let others = places.map(|u| parameter.from_unit(u));
-        let tried: Vec<f64> = std::iter::once(values[i]).chain(others).collect();
+    for (i, parameter) in open {
+        let tried: Vec<f64> = std::iter::once(values[i])
+            .chain(others(parameter))
+            .collect();
         let point = |&value: &f64| {
             let mut theta = values.clone();
             theta[i] = value;

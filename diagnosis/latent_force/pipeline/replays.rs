@@ -1,5 +1,6 @@
 //! Open-loop replays of the model without effects, of the set that stands and of its rivals.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use asid_core::progress::UntilLate;
@@ -67,12 +68,15 @@ fn region(fitted: &Fitted) -> Option<Region> {
 }
 
 /// All fitted sets, one for each set of names, in descending order of evidence.
-fn all_sets(outcome: &Outcome, candidates: &[Candidate]) -> Vec<Set> {
+///
+/// The set of the `known` candidates, if there are any, is always among them, even if another set
+/// has the same names beside tolerances.
+fn all_sets(outcome: &Outcome, candidates: &[Candidate], known: &[usize]) -> Vec<Set> {
     let mut sets: Vec<Set> = Vec::new();
     let named = |set: &Set| {
         let mut members = labels_of(candidates, &set.candidates);
         members.sort_unstable();
-        members
+        (!known.is_empty() && set.candidates == known, members)
     };
     let stands = |set: &Set| set.candidates == outcome.best.candidates;
     for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
@@ -375,8 +379,11 @@ pub(super) fn replay(
         .collect();
     let (of_none, of_best, rivals) = efforts(repeats, progress, &mut not_tried);
     let none = replays.of(&outcome.none, &[], (of_none, None))?;
-    let mut sets = all_sets(outcome, candidates);
-    let ranking = ranking(candidates, outcome, &sets);
+    let mut sets = all_sets(outcome, candidates, known);
+    let mut ranking = ranking(candidates, outcome, &sets);
+    // With tolerances and without them it is the same answer.
+    let mut listed = BTreeSet::new();
+    ranking.retain(|r| listed.insert(r.effects.clone()));
     if progress.is_stopped() {
         // Derivatives with respect to tolerances take longer than those of all names.
         let best = &outcome.best.candidates;
@@ -420,4 +427,29 @@ pub(super) fn replay(
         not_tried,
     };
     Ok((findings, sets))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::latent_force::search::by_hand::{candidate, outcome, round, set, tolerance};
+
+    use super::*;
+
+    /// Symptom: with the steps of a coarse encoder beside tolerances the verdict was `none`. Cause:
+    /// the steps alone have the same names, and were left out as the same answer.
+    #[test]
+    fn known_steps_are_a_set_of_their_own_beside_tolerances_with_them() {
+        let candidates = [candidate("sensor-quantization@q"), tolerance("mass@cart")];
+        let beside = set(&candidates, (&[&[0]], &[1]), 830.0);
+        let alone = set(&candidates, (&[&[0]], &[]), 800.0);
+        let fits = vec![beside.clone(), alone];
+        let outcome = outcome(vec![round(&[], &[], (&[], fits))], beside);
+        let sets = all_sets(&outcome, &candidates, &[0]);
+        let members: Vec<&[usize]> = sets.iter().map(|s| &s.candidates[..]).collect();
+        assert_eq!(members, [&[0, 1][..], &[0]]);
+        let (replayed, stands) = replayed_sets(&outcome, sets, (&[0], 0));
+        assert!(stands && replayed.len() == 2);
+        // A search that knows no steps gives one answer for one set of names.
+        assert_eq!(all_sets(&outcome, &candidates, &[]).len(), 1);
+    }
 }

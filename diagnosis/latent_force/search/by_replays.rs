@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::latent_force::fit::Slopes;
 use crate::latent_force::screen::Screened;
 
+use super::line_fit::least_squares;
 use super::open_loop::MOST;
 use super::round::Upon;
 use super::screening::Look;
@@ -50,11 +51,9 @@ impl Given {
         if self.slopes.ncols() == 0 || self.slopes.nrows() != r.len() {
             return whole;
         }
-        let gram = self.slopes.tr_mul(&self.slopes);
-        let moment = self.slopes.tr_mul(&r);
         // Parameters that change no residual have nothing to remove.
-        let taken = gram.svd(true, true).solve(&moment, f64::EPSILON.sqrt());
-        let taken = taken.map_or(0.0, |x| x.dot(&moment));
+        let taken = least_squares(&self.slopes, &r);
+        let taken = taken.map_or(0.0, |x| x.dot(&self.slopes.tr_mul(&r)));
         (whole - taken).max(0.0)
     }
 
@@ -310,6 +309,19 @@ mod tests {
         assert!((left(&[2.0, 0.0, 0.0]) - 16.0).abs() < 1e-9);
         assert!((left(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - 16.0).abs() < 1e-9);
         assert!(left(&[1.0, 1.0, 0.0, 1.0, -1.0, 0.0]) < 1e-9);
+    }
+
+    /// Symptom: the order of laws changed with the unit of a parameter of the study. Cause: a column
+    /// of small numbers counted as one of zeros.
+    #[test]
+    fn what_a_parameter_makes_up_for_does_not_depend_on_its_unit() {
+        for unit in [1e-9, 1e-6, 1.0, 1e6] {
+            let columns = [2.0 * unit, 0.0, 0.0, 1.0, 1.0, 0.0];
+            let slopes = |n: usize| DMatrix::from_column_slice(3, n, &columns[..3 * n]);
+            let left = |n: usize| Given { slopes: slopes(n) }.left(vec![3.0, 4.0, 5.0]);
+            assert!((left(1) - 41.0).abs() < 1e-9, "{unit}: {}", left(1));
+            assert!((left(2) - 25.0).abs() < 1e-9, "{unit}: {}", left(2));
+        }
     }
 
     /// Symptom: a law whose replay diverges was ranked first. Cause: what the parameters make up

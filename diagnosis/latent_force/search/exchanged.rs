@@ -36,7 +36,7 @@ impl Search<'_> {
             named.map(|c| c.spec.name.clone()).collect()
         };
         for law in laws(&path.best) {
-            if path.best.names < 2 || self.progress.is_stopped() {
+            if path.best.names.count() < 2 || self.progress.is_stopped() {
                 break;
             }
             let is_out = |c: &usize| {

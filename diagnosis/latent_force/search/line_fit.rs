@@ -86,13 +86,29 @@ fn step(
     if slopes.iter().chain(here.iter()).any(|x| !x.is_finite()) {
         return Ok(None);
     }
-    let gram = slopes.tr_mul(&slopes);
-    let moment = slopes.tr_mul(&here);
     // A value that no residual depends on stays where it is.
-    Ok(gram
-        .svd(true, true)
-        .solve(&moment, f64::EPSILON.sqrt())
-        .ok())
+    Ok(least_squares(&slopes, &here))
+}
+
+/// The coefficients of columns that come closest to some residuals; 0 for a column of zeros.
+///
+/// `None` if they cannot be computed. Columns have the length one in the equations that are solved,
+/// so that the unit of a value does not decide whether its column counts.
+pub(super) fn least_squares(
+    columns: &DMatrix<f64>,
+    residuals: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    let length = |norm: f64| if norm > 0.0 { norm } else { 1.0 };
+    let each = columns.column_iter().map(|c| length(c.norm()));
+    let lengths = DVector::from_iterator(columns.ncols(), each);
+    let mut units = columns.clone();
+    for (mut column, length) in units.column_iter_mut().zip(lengths.iter()) {
+        column /= *length;
+    }
+    let gram = units.tr_mul(&units);
+    let moment = units.tr_mul(residuals);
+    let found = gram.svd(true, true).solve(&moment, f64::EPSILON.sqrt());
+    Some(found.ok()?.component_div(&lengths))
 }
 
 /// Sum of squares.
@@ -142,6 +158,20 @@ mod tests {
             (found[0] - 2.0).abs() < 1e-6 && found[1] == 4.0,
             "{found:?}"
         );
+    }
+
+    /// Symptom: a servo's stiffness in N/m stayed where it was, although replays depend on it. Cause:
+    /// its column is small, since a newton per metre does little, and counted as one of zeros.
+    #[test]
+    fn a_value_is_found_in_any_unit() {
+        let residuals = |z: &[f64]| Ok(vec![40e-6 * (z[0] - 2e6)]);
+        let value = Value {
+            start: 0.5e6,
+            step: 1e3,
+            bounds: [0.0, 9e6],
+        };
+        let (found, _) = fitted(&residuals, &[value], &Silent).unwrap();
+        assert!((found[0] / 2e6 - 1.0).abs() < 1e-6, "{found:?}");
     }
 
     #[test]

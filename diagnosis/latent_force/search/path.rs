@@ -71,8 +71,8 @@ impl Search<'_> {
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         let of_taken = first.confirmed.iter().find(|s| s.candidates == *taken)?;
         let last = path.rounds.last()?;
-        let earns =
-            |s: &Set| s.names > path.best.names && s.rises_above(&path.best, self.threshold);
+        let names = path.best.names.count();
+        let earns = |s: &Set| s.names.count() > names && s.rises_above(&path.best, self.threshold);
         let is_left = last.base == path.best.candidates && last.confirmed.iter().any(earns);
         let near = |s: &&Set| {
             s.candidates != *taken
@@ -107,7 +107,7 @@ impl Search<'_> {
         let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
         // Trial base that does not count by itself.
         let mut tentative: Option<Set> = None;
-        let mut depth = breadth.depth.saturating_sub(path.best.names);
+        let mut depth = breadth.depth.saturating_sub(path.best.names.count());
         let mut gap = OpenLoopGap::by(self.open_loop);
         while path.rounds.len() < depth {
             let no_force = left(&path.best) < breadth.shrinks;
@@ -145,7 +145,8 @@ impl Search<'_> {
             let Some(next) =
                 upon_tolerances(context, candidates, (best, next, at_first), last, how)?
             else {
-                let is_name = |s: &&Set| s.names > best.names && s.rises_above(best, threshold);
+                let names = best.names.count();
+                let is_name = |s: &&Set| s.names.count() > names && s.rises_above(best, threshold);
                 let leads = confirmed.iter().find(is_name);
                 tentative = leads.filter(|_| !was_tried && !stopped).cloned();
                 if tentative.is_none() {

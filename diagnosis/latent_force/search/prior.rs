@@ -26,7 +26,7 @@ const TOGETHER: f64 = 10.0;
 pub(super) fn worth(context: &Context<'_>, candidates: &[Candidate], set: &Set) -> f64 {
     let prior = log_prior(context.plant(), candidates, &set.candidates);
     let price = (nameable(candidates) as f64).ln();
-    set.fitted.evidence + prior - price * set.names as f64
+    set.fitted.evidence + prior - price * set.names.count() as f64
 }
 
 /// Logarithm of the prior odds of some candidates, in nats.

@@ -136,7 +136,7 @@ pub(super) fn earned(
 ) -> Result<Set> {
     let is_more = |c: &usize| !candidates[*c].is_tolerance && !base.candidates.contains(c);
     let mut set = set;
-    while set.names > base.names + 1 && !progress.is_stopped() {
+    while set.names.count() > base.names.count() + 1 && !progress.is_stopped() {
         let added = set.candidates.iter().copied().filter(is_more);
         let change = |c: usize| change_without(candidates, &set, &[c]).unwrap_or(f64::NEG_INFINITY);
         // The member whose removal costs least.

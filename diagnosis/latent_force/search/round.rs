@@ -180,8 +180,13 @@ impl Upon<'_> {
         let Look { some, columns, .. } = look;
         let base = self.base;
         let (hypothesis, theta, added) = with(&base.fitted, columns, some, screened);
-        let mut candidates = base.candidates.clone();
-        candidates.extend(added.iter().map(|&c| self.open[c]));
+        let added: Vec<usize> = added.into_iter().map(|c| self.open[c]).collect();
+        let (mut candidates, mut names) = (base.candidates.clone(), base.names.clone());
+        candidates.extend(&added);
+        // A group is one name, and so is each of a pair.
+        let size = added.len() / screened.names.max(1);
+        let each = added.chunks(size.max(1));
+        each.for_each(|name| names.add(name.to_vec()));
         let mut set = Set {
             candidates,
             fitted: Fitted {
@@ -189,11 +194,11 @@ impl Upon<'_> {
                 theta,
                 ..base.fitted.clone()
             },
-            names: base.names + screened.names,
+            names,
         };
-        for &c in &added {
-            if let Some(simpler) = refined_by(self.candidates, self.open[c]) {
-                set = refined(&set, self.candidates, [self.open[c], simpler]);
+        for c in added {
+            if let Some(simpler) = refined_by(self.candidates, c) {
+                set = refined(&set, self.candidates, [c, simpler]);
             }
         }
         set

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
-use crate::latent_force::columns::{Columns, Leads};
+use crate::latent_force::columns::{Columns, Form, Leads};
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
 use crate::latent_force::scales::{Scales, at_own_scales};
@@ -145,7 +145,7 @@ impl Upon<'_> {
     }
 
     /// What a screening could have shown, at the most likely of the scales of `q`; `found` is the
-    /// evidence of its best candidate.
+    /// evidence of its best candidate, prior odds included.
     fn sight(
         &self,
         (sums, found): (&[Regression], f64),
@@ -159,7 +159,10 @@ impl Upon<'_> {
         };
         let threshold = threshold(nameable(self.candidates), self.breadth.false_alarms);
         let mut limits = limits(sum, columns, some, threshold);
-        let mut rehearsal = rehearse(sum, columns, (&limits, found), self.breadth.seed);
+        let odds = |f: &Form| log_prior(self.context.plant(), some, &[f.candidate]);
+        let odds: Vec<f64> = columns.forms.iter().map(odds).collect();
+        let all = (columns, &odds[..]);
+        let mut rehearsal = rehearse(sum, all, (&limits, found), self.breadth.seed);
         let place = |c: &mut usize| *c = self.open[*c];
         limits.iter_mut().for_each(|l| place(&mut l.candidate));
         let taken_for = rehearsal.recognised.iter_mut().flatten();

@@ -70,7 +70,8 @@ impl Upon<'_> {
         };
         let further = self.in_place_of(best, &sets)?;
         sets = self.in_order(joined(sets, further));
-        let several = sets.first().filter(|s| s.names > self.base.names + 1);
+        let names = self.base.names.count();
+        let several = sets.first().filter(|s| s.names.count() > names + 1);
         if let (Some(several), Some(tolerances)) = (several, tolerances) {
             let reached = several.fitted.evidence;
             let beside = self.fewer_with(tolerances, several)?;

@@ -102,7 +102,7 @@ impl Search<'_> {
             }
             let rest = without(best, self.candidates, *out);
             let mut set = with_that_of(&rest, other, self.candidates, *into);
-            set.names = best.names;
+            set.names.extend(other.names.among(&[*into]));
             // In segments only a long fit shows the scatter of its evidence.
             let [little, whole] = self.breadth.rounds;
             let rounds = if context.has_segments() {
@@ -174,7 +174,7 @@ impl Search<'_> {
                 continue;
             };
             let is_level = |s: &&Set| {
-                s.names == ahead.names
+                s.names.count() == ahead.names.count()
                     && s.is_level_with(ahead, rise)
                     && ahead.is_level_with(s, rise)
             };
@@ -187,10 +187,10 @@ impl Search<'_> {
                 for c in out.into_iter().chain(self.within_tolerance(best, &into)) {
                     twin = without(&twin, self.candidates, c);
                 }
+                twin.names.extend(other.names.among(&into));
                 for c in into {
                     twin = with_that_of(&twin, other, self.candidates, c);
                 }
-                twin.names = best.names;
                 twin.fit(context, (self.breadth.rounds[0], self.progress))?;
                 twins.push(twin);
                 if twins.len() >= MOST {

@@ -219,7 +219,6 @@ impl<'a> Owned<'a> {
                 residual: pick(&linear.residual, (1, &[0]), (ns, entries)),
                 h: pick(&linear.h, (nx, &own), (ns, entries)),
                 early: some(&linear.early, entries),
-                late: some(&linear.late, entries),
                 ..LinearEpisode::default()
             },
             b: pick(problem.b, (nv, dofs), (nx, &own)),

@@ -51,10 +51,11 @@ pub struct LinearEpisode {
     /// to its initial state.
     pub h: Vec<f64>,
     /// Number of readings of each entry, for a late sensor, that measure a time before the first
-    /// row; `ns`, or empty for none.
+    /// row, or the row of a later reading; `ns`, or empty for none.
     pub early: Vec<f64>,
-    /// Delay of the readings of each entry, s; `ns`, or empty for none.
-    pub late: Vec<f64>,
+    /// Row that each reading measures, `rows x ns`, or empty if no sensor is late; `None` for a time
+    /// before the first row, and for a missing reading of a late sensor.
+    pub assigned: Vec<Option<usize>>,
     /// Change of `f` by each variation, `(rows - 1) x nx x m`.
     pub state_columns: Vec<f64>,
     /// Change of `h` by each variation, `rows x ns x m`; for a segment, over its whole replay.
@@ -84,7 +85,7 @@ impl LinearEpisode {
             residual: vec![f64::NAN; rows * ns],
             h: vec![0.0; usize::from(want.state) * rows * ns * nx],
             early: Vec::new(),
-            late: Vec::new(),
+            assigned: Vec::new(),
             state_columns: vec![0.0; usize::from(!segment) * steps * nx * m],
             reading_columns: vec![0.0; rows * ns * m],
         }
