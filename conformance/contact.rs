@@ -4,7 +4,7 @@ use asid_core::{Backend, Capabilities, Result};
 
 use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
-use crate::rig::{G, Rig, broken, largest, last, relative};
+use crate::rig::{G, Rig, broken, differing_bits, largest, last, relative};
 
 const CONTACT: Capabilities = Capabilities::CONTACT.union(Capabilities::FREE_BODIES);
 const FORCES: Capabilities = CONTACT.union(Capabilities::CONTACT_FORCES);
@@ -50,6 +50,14 @@ pub const CHECKS: &[Check] = &[
         tolerance: Tolerance::same(1e-3),
         reason: "at rest forces balance: what an iterative solver leaves over",
         measure: Figure(weight),
+    },
+    Check {
+        name: "contact/force-is-read-where-it-is-set",
+        needs: FORCES,
+        unit: "",
+        tolerance: Tolerance::same(0.5),
+        reason: "a box is set to where it came to rest, and pushes by its weight: half for a solver that begins anew",
+        measure: Figure(weight_where_set),
     },
     Check {
         name: "contact/force-on-a-slope",
@@ -119,8 +127,8 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A box of 0.5 kg on a plane under tilted gravity, after one second.
-fn resting(backend: &dyn Backend, angle: f64, channels: &[&str]) -> Result<Vec<f64>> {
+/// A box of 0.5 kg on a plane under tilted gravity, and its readings after one second.
+fn rested(backend: &dyn Backend, angle: f64, channels: &[&str]) -> Result<(Rig, Vec<f64>)> {
     let (sin, cos) = angle.sin_cos();
     let inside = format!(
         r#"<option cone="elliptic" impratio="100" gravity="{} 0 {}"/><worldbody>
@@ -131,7 +139,12 @@ fn resting(backend: &dyn Backend, angle: f64, channels: &[&str]) -> Result<Vec<f
         -G * cos
     );
     let mut rig = Rig::new(backend, &inside, channels)?;
-    Ok(last(&rig.run(500, &[])?)?.to_vec())
+    let end = last(&rig.run(500, &[])?)?.to_vec();
+    Ok((rig, end))
+}
+
+fn resting(backend: &dyn Backend, angle: f64, channels: &[&str]) -> Result<Vec<f64>> {
+    Ok(rested(backend, angle, channels)?.1)
 }
 
 fn rest_heights(backend: &dyn Backend) -> Result<f64> {
@@ -182,6 +195,18 @@ fn rest_wanders(backend: &dyn Backend) -> Result<f64> {
 fn weight(backend: &dyn Backend) -> Result<f64> {
     let end = resting(backend, 0.0, &["contact.world/b"])?;
     Ok(relative(end[0], 0.5 * G))
+}
+
+/// Deviation of the contact force that is read of a state that was set; NaN if reading moves it.
+fn weight_where_set(backend: &dyn Backend) -> Result<f64> {
+    let channels = ["contact.world/b", "qpos.b", "qvel.b"];
+    let (mut rig, end) = rested(backend, 0.0, &channels)?;
+    rig.place(&end[1..8], &[0.0; 6])?;
+    let (first, again) = (rig.read()?, rig.read()?);
+    if differing_bits(&first, &again) > 0.0 {
+        return Ok(f64::NAN);
+    }
+    Ok(relative(first[0][0], 0.5 * G))
 }
 
 fn weight_on_slope(backend: &dyn Backend) -> Result<f64> {

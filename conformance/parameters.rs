@@ -63,6 +63,14 @@ pub const CHECKS: &[Check] = &[
         measure: Figure(change_in_rollout),
     },
     Check {
+        name: "parameters/one-mass-of-a-body",
+        needs: Capabilities::ARTICULATION.union(Capabilities::MASS_PARAMETERS),
+        unit: "",
+        tolerance: Tolerance::same(0.0),
+        reason: "the mass of a body beside that of its geom has no clear meaning, in either order: accepted of two",
+        measure: Figure(one_mass),
+    },
+    Check {
         name: "parameters/nonsense-is-refused",
         needs: ANY,
         unit: "",
@@ -258,6 +266,21 @@ fn change_in_rollout(backend: &dyn Backend) -> Result<f64> {
         relative(rows[15][2], -18.0 * frame),
         relative(rows[19][2], -26.0 * frame),
     ]))
+}
+
+fn one_mass(backend: &dyn Backend) -> Result<f64> {
+    let (inside, _) = claimed(backend);
+    let (geom, body) = ("geom/far/mass", "body/arm/mass");
+    let orders = [[geom, body], [body, geom]];
+    let accepted = orders.iter().filter(|targets| {
+        let size = Size {
+            sims: 1,
+            threads: 1,
+            targets: &targets[..],
+        };
+        Rig::with(backend, &inside, &[], size).is_ok()
+    });
+    Ok(accepted.count() as f64)
 }
 
 fn nonsense(backend: &dyn Backend) -> Result<f64> {

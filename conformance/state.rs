@@ -1,13 +1,17 @@
 //! States: saving, restoring, copying and setting them; and what results may depend on.
 //!
-//! Every figure here is a number of readings that differ in any bit.
+//! Nearly every figure here is a number of readings that differ in any bit.
 
-use asid_core::{Backend, Capabilities, Result, Snapshot};
+use std::sync::Mutex;
 
-use crate::check::Measure::Figure;
+use asid_core::simulator::StepView;
+use asid_core::{Backend, Capabilities, Error, Result, Snapshot};
+
+use crate::check::Measure::{Figure, Taken};
 use crate::check::{Check, Tolerance};
-use crate::rig::{Rig, Rows, broken, differing_bits};
-use crate::subject::{batch, command, elsewhere, roll, stir, stirred};
+use crate::effects::By;
+use crate::rig::{Rig, Rows, broken, differing_bits, largest};
+use crate::subject::{batch, command, elsewhere, falling, roll, stir, stirred};
 
 /// No capability: every engine must pass the check.
 const ANY: Capabilities = Capabilities::empty();
@@ -38,6 +42,14 @@ pub const CHECKS: &[Check] = &[
     check("state/copied-continues", EXACT, copied),
     check("state/set-forgets-history", ANY, set_state),
     check("state/reset-forgets-history", ANY, reset),
+    Check {
+        name: "state/reset-is-at-time-zero",
+        needs: ANY,
+        unit: "s",
+        tolerance: NONE,
+        reason: "an episode begins at time zero, whatever time the first <key> states: by a <clock> and by a hook, where they are taken",
+        measure: Taken(time_zero),
+    },
     check("state/threads-change-nothing", ANY, threads),
     check("state/batch-equals-single", ANY, batch_equals_single),
     check("state/subset-leaves-others", ANY, subset),
@@ -119,6 +131,40 @@ fn reset(backend: &dyn Backend) -> Result<f64> {
     let used = roll(&mut rig, &[0, 1, 2], 80, 2)?;
     let new = roll(&mut batch(backend, 3, 1)?, &[0, 1, 2], 80, 2)?;
     Ok(differing_bits(&used, &new))
+}
+
+/// Times at which episodes begin, of a new batch and after a reset; `None` if nothing shows them.
+fn time_zero(backend: &dyn Backend) -> Result<Option<f64>> {
+    let body = falling(backend);
+    let key = r#"<keyframe><key time="5"/></keyframe>"#;
+    let mut times = Vec::new();
+    let inside = format!(
+        r#"{}<sensor><clock name="now"/></sensor>{key}"#,
+        body.inside
+    );
+    if let Ok(mut rig) = Rig::new(backend, &inside, &["now"])
+        && let Ok(begun) = rig.read()
+    {
+        rig.run(3, &[])?;
+        rig.simulator.reset(&[0])?;
+        times.extend([begun[0][0], rig.read()?[0][0]]);
+    }
+    if (backend.capabilities()).contains(Capabilities::STEP_HOOKS) {
+        let mut rig = Rig::new(backend, &format!("{}{key}", body.inside), body.velocity)?;
+        let seen = Mutex::new(Vec::new());
+        let hook = By(|step: usize, view: &mut StepView<'_>| {
+            if let (0, Ok(mut seen)) = (step, seen.lock()) {
+                seen.push(view.time);
+            }
+        });
+        for _ in 0..2 {
+            rig.run_with(3, 1, &[], |extras| extras.hook = Some(&hook))?;
+            rig.simulator.reset(&[0])?;
+        }
+        let seen = seen.into_inner();
+        times.extend(seen.map_err(|_| Error::Failed("a hook panicked".into()))?);
+    }
+    Ok((!times.is_empty()).then(|| largest(times)))
 }
 
 fn threads(backend: &dyn Backend) -> Result<f64> {

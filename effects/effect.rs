@@ -6,7 +6,7 @@ use asid_core::registry::Origin;
 use asid_core::simulator::StepView;
 use asid_core::target::Target;
 use asid_mjcf::native::NativeModel;
-use asid_mjcf::plant::Plant;
+use asid_mjcf::plant::{ForceLimit, Plant};
 
 use crate::acts::Acts;
 use crate::reach::Reach;
@@ -154,6 +154,8 @@ pub trait Acting: Send {
     /// Changes the model's parameters before the simulation runs; `columns` is one row of them all.
     fn set(&self, _columns: &mut [f64]) {}
     /// Called before each physics step.
+    ///
+    /// Commands are within their ranges. What effects make of them may leave these.
     fn before_step(&mut self, _view: &mut StepView<'_>) {}
     /// Turns the true reading of the site's sensor at a time (s) into what the sensor reports.
     ///
@@ -217,6 +219,22 @@ pub trait Effect: Send + Sync {
     /// Whether [`Acting::before_step`] has something to do.
     fn steps(&self) -> bool {
         matches!(self.acts(), Acts::Command | Acts::Force)
+    }
+    /// Whether it relies on joints whose damping is integrated implicitly, however strong it is.
+    fn needs_implicit_damping(&self) -> bool {
+        false
+    }
+    /// Whether it takes the drive of its site, a joint, away from the joint.
+    ///
+    /// It then comes last, since others depend on the drive.
+    fn takes_drive(&self) -> bool {
+        false
+    }
+    /// The limit of the force of the drive at its site that it sets with some values.
+    ///
+    /// Where another effect [takes](Effect::takes_drive) that drive, that one applies the limit.
+    fn force_limit(&self, _values: &[f64]) -> Option<ForceLimit> {
+        None
     }
     /// Whether the reading that it makes depends on earlier readings.
     ///

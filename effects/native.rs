@@ -10,6 +10,7 @@ use asid_core::{Backend, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::native::NativeModel;
 
+use crate::refined::rank;
 use crate::{Acts, EffectSpec, Native, RefinedModel, Site};
 
 /// How the document expresses an effect.
@@ -75,10 +76,19 @@ pub fn plain(backend: &dyn Backend, model: &RefinedModel, folder: &Path) -> Resu
         found.push(spec.find(&plant)?);
     }
     let mut places: Vec<usize> = (0..order.len()).collect();
-    places.sort_by_key(|&i| found[i].acts() != Acts::Command);
+    places.sort_by_key(|&i| rank(&*found[i]));
     for i in places {
         let (spec, effect) = (order[i], &found[i]);
         let numbers = spec.values_of(&**effect)?;
+        let nulls = effect.parameters().iter().map(|p| p.null);
+        if !numbers.is_empty() && nulls.eq(numbers.iter().copied()) {
+            // A simulation is without it.
+            expressed.push(Expressed {
+                effect: spec.clone(),
+                native: Native::Whole,
+            });
+            continue;
+        }
         let targets = effect.targets(&plant, &spec.site);
         let mut columns = Vec::with_capacity(targets.len());
         for target in &targets {

@@ -5,11 +5,13 @@
 //! of a batch has effects of its own, whose parameters are columns like the scene's:
 //! `effect/NAME@SITE/PARAMETER`. A row whose effect has null values runs without it, at no cost.
 
+mod ranges;
+mod rows;
 mod simulator;
 
 use std::sync::Arc;
 
-use crate::{Acts, Effect, EffectSpec};
+use crate::{Acts, Effect, EffectParameter, EffectSpec};
 use asid_core::backend::{Backend, Capabilities, Model};
 use asid_core::error::{Error, Result};
 use asid_core::layout::Layout;
@@ -17,6 +19,8 @@ use asid_core::scene::Scene;
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::target::Target;
 use asid_mjcf::plant::Plant;
+use ranges::{Ranged, behind_ranges, ranged};
+use rows::Effects;
 use simulator::Column;
 pub use simulator::RefinedSimulator;
 
@@ -70,6 +74,7 @@ pub struct Refined {
     inner: Arc<dyn Model>,
     plant: Arc<Plant>,
     placed: Arc<Vec<Placed>>,
+    ranged: Vec<Ranged<Target>>,
     fixed: Vec<(Target, f64)>,
 }
 
@@ -87,6 +92,7 @@ impl Refined {
         fixed: &[(Target, f64)],
         effects: &[EffectSpec],
     ) -> Result<Arc<Self>> {
+        let plant = behind_ranges(&plant, model.layout());
         let mut placed: Vec<Placed> = Vec::with_capacity(effects.len());
         for spec in effects {
             let effect = spec.find(&plant)?;
@@ -103,6 +109,15 @@ impl Refined {
                 return Err(Error::Incapable {
                     backend: backend.name().to_owned(),
                     what: format!("give a scene the effect `{label}`: it needs {lacking:?}"),
+                });
+            }
+            if effect.needs_implicit_damping() && !model.damps_implicitly() {
+                return Err(Error::Incapable {
+                    backend: backend.name().to_owned(),
+                    what: format!(
+                        "give a scene the effect `{label}` with an integrator that damps joints explicitly, which is \
+                         unstable; write integrator=\"implicitfast\" in <option>"
+                    ),
                 });
             }
             let targets = effect.targets(&plant, &spec.site);
@@ -123,14 +138,14 @@ impl Refined {
                 sensor,
             });
         }
-        // Command effects come first: a force may depend on the command that reaches the drive.
-        placed.sort_by_key(|p| p.effect.acts() != Acts::Command);
+        placed.sort_by_key(|p| rank(&*p.effect));
         for (target, _) in fixed {
             model.nominal(target)?;
         }
         let refined = Arc::new(Self {
+            ranged: ranged(&*model, &plant, &placed),
             inner: model,
-            plant,
+            plant: Arc::new(plant),
             placed: Arc::new(placed),
             fixed: fixed.to_vec(),
         });
@@ -184,6 +199,21 @@ pub fn needs(effect: &dyn Effect) -> Capabilities {
     }
 }
 
+/// Place of an effect in the order in which a simulation applies them.
+///
+/// Effects on commands come first, since a force may depend on the command that reaches the drive,
+/// and limits of the force are the last of them. One that takes the drive from its joint comes after
+/// all that depend on the drive.
+pub(crate) fn rank(effect: &dyn Effect) -> u8 {
+    let limits = effect.parameters().iter().any(EffectParameter::is_limit);
+    match effect.acts() {
+        Acts::Command if limits => 1,
+        Acts::Command => 0,
+        _ if effect.takes_drive() => 3,
+        _ => 2,
+    }
+}
+
 impl Model for Refined {
     fn layout(&self) -> &Layout {
         self.inner.layout()
@@ -195,6 +225,10 @@ impl Model for Refined {
 
     fn remembers_commands(&self) -> bool {
         self.inner.remembers_commands()
+    }
+
+    fn damps_implicitly(&self) -> bool {
+        self.inner.damps_implicitly()
     }
 
     fn nominal(&self, target: &Target) -> Result<f64> {
@@ -248,6 +282,17 @@ impl Refined {
             .iter()
             .map(|p| p.targets.iter().map(&mut place).collect())
             .collect();
+        let ranged = self.ranged.iter().map(|drive| Ranged {
+            actuator: drive.actuator,
+            gains: drive.gains.iter().map(&mut place).collect(),
+            by: drive.by.clone(),
+        });
+        let ranged = ranged.collect();
+        let held = targets.iter().enumerate();
+        let held = held.filter(|(_, t)| !self.placed.is_empty() && self.plant.holds(t));
+        let held = held
+            .map(|(at, t)| Ok((at, t.clone(), self.inner.nominal(t)?)))
+            .collect::<Result<Vec<_>>>()?;
         let base = targets
             .iter()
             .map(|t| self.nominal(t))
@@ -261,8 +306,14 @@ impl Refined {
             .iter()
             .map(|t| self.nominal(t))
             .collect::<Result<Vec<_>>>()?;
-        let effects = (Arc::clone(&self.plant), Arc::clone(&self.placed));
-        let mut simulator = RefinedSimulator::new(inner, effects, (places, base), columns)?;
+        let effects = Effects {
+            plant: Arc::clone(&self.plant),
+            placed: Arc::clone(&self.placed),
+            places,
+            held,
+            ranged,
+        };
+        let mut simulator = RefinedSimulator::new(inner, effects, base, columns)?;
         let all: Vec<usize> = (0..config.size).collect();
         simulator.set_parameters(&all, &nominal.repeat(config.size))?;
         Ok(simulator)

@@ -4,8 +4,9 @@ use roxmltree::Node;
 
 /// What an element, else its default class, else a class around that, says.
 ///
-/// `of` reads the element, and the elements of a class, of which the last that says it counts.
-/// `root` is the document's root element.
+/// An element that names no class has the `childclass` of the nearest element around it. `of` reads
+/// the element, and the elements of a class, of which the last that says it counts. `root` is the
+/// document's root element.
 pub fn said<T>(
     root: Node<'_, '_>,
     node: Node<'_, '_>,
@@ -16,7 +17,12 @@ pub fn said<T>(
     }
     let sections = root.children().filter(|n| n.has_tag_name("default"));
     let sections: Vec<Node<'_, '_>> = sections.collect();
-    let named = node.attribute("class").and_then(|class| {
+    let given = || {
+        let mut around = node.ancestors().skip(1);
+        around.find_map(|n| n.attribute("childclass"))
+    };
+    let class = node.attribute("class").or_else(given);
+    let named = class.and_then(|class| {
         let mut all = sections.iter().flat_map(|s| s.descendants());
         all.find(|n| n.has_tag_name("default") && n.attribute("class") == Some(class))
     });

@@ -51,12 +51,13 @@ pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
         bodies.push(body);
     }
     let actuators = model.actuators.iter().enumerate().map(|(i, a)| {
+        let range = range(a.ctrl_range);
         let limited = a
             .ctrl_limited
-            .resolve(model.compiler.autolimits, a.ctrl_range.is_some());
+            .resolve(model.compiler.autolimits, range.is_some());
         Actuator {
             name: a.name.clone().unwrap_or(format!("actuator{i}")),
-            ctrl_range: a.ctrl_range.filter(|_| limited),
+            ctrl_range: range.filter(|_| limited),
         }
     });
     let actuators: Vec<_> = actuators.collect();
@@ -110,6 +111,12 @@ pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
         });
     }
     Ok(layout)
+}
+
+/// The range of an actuator; `None` where its ends do not differ, such as `0 0`, which is no limit.
+#[must_use]
+pub fn range(stated: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    stated.filter(|[low, high]| low < high)
 }
 
 /// Kind of a joint of the document.

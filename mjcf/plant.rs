@@ -6,14 +6,16 @@
 
 mod drive;
 mod jacobian;
+mod limits;
 mod poses;
 mod reading;
 mod sensor;
+mod values;
 
 use asid_core::error::{Error, Result};
 use asid_core::layout::{JointKind, Layout};
 
-pub use drive::{Drive, DriveLaw, law};
+pub use drive::{Drive, DriveLaw, ForceLimit, law};
 
 /// A body.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +66,10 @@ pub struct PlantGeom {
     pub priority: i32,
     /// Whether the body's mass comes from its geoms, so that this geom's mass can be changed.
     pub has_mass: bool,
+    /// That mass, kg; 0 where the body's mass does not come from its geoms.
+    pub mass: f64,
+    /// Centre of that mass in the body's frame, m.
+    pub center: [f64; 3],
 }
 
 /// What a sensor reads.
@@ -97,6 +103,8 @@ pub struct Plant {
     pub sensors: Vec<Reads>,
     /// Pairs of geoms that can touch, each once, the smaller index first.
     pub contacts: Vec<[usize; 2]>,
+    /// Limits of the drives' forces that the document does not have, by the index of the actuator.
+    pub force_limits: Vec<(usize, ForceLimit)>,
     /// Pose of each body in its parent's frame, as declared.
     poses: Vec<nalgebra::Isometry3<f64>>,
 }

@@ -3,6 +3,9 @@
 #![cfg(feature = "mujoco")]
 #![allow(clippy::unwrap_used)]
 
+#[path = "native_export/beside.rs"]
+mod beside;
+
 use asid::core::registry::{BackendEntry, find};
 use asid::core::{Backend, BatchConfig, Control, Model, Rollout, Scene};
 use asid::effects::native::{PlainModel, plain};
@@ -260,6 +263,40 @@ fn a_place_inside_a_frame_is_written_as_the_frame_sees_it() {
     );
 }
 
+/// Symptom: on rapier no document was written with a spring, and a loose joint kept its range on
+/// the drive's side. Cause: rapier has no targets of a spring's rest and of a range, which the
+/// document states.
+#[test]
+fn a_smaller_engine_writes_the_same_document() {
+    let rapier = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
+    let xml = ARM
+        .replace(r#"angle="degree""#, r#"angle="radian""#)
+        .replace(r#"range="-170 170""#, r#"range="-2.5 2.5""#)
+        .replace(
+            r#"name="elbow""#,
+            r#"name="elbow" stiffness="1.5" springref="0.4""#,
+        );
+    for effect in [
+        "joint-stiffness@shoulder:stiffness=3,rest=0.4",
+        "joint-stiffness@elbow:stiffness=2,rest=-0.3",
+        "actuator-gain@hold:gain=0.8",
+        "actuator-bias@push:bias=0.2",
+        "actuator-delay@push:delay=0.013",
+        "actuator-lag@hold:time_constant=0.1",
+        "backlash@shoulder:width=0.1",
+        "joint-compliance@shoulder:compliance=0.05",
+        "sensor-delay@q1:delay=0.02",
+    ] {
+        let model = refined(&xml, &[], &[effect]);
+        let written = plain(&*rapier, &model, std::path::Path::new("")).unwrap();
+        assert_eq!(written.xml, exported(&model).xml, "{effect}");
+        if effect.starts_with("backlash") {
+            let range = r#"limited="true" range="-2.5 2.5""#;
+            assert!(written.xml.contains(range), "{}", written.xml);
+        }
+    }
+}
+
 /// Symptom: an exported servo with a `timeconst` answered without its lag.
 ///
 /// Cause: a gain or a bias of its command is written in the long form, with `dyntype="none"`.
@@ -271,8 +308,9 @@ fn a_servo_with_a_gain_keeps_its_own_lag() {
         r#"size="0.02"/><position timeconst="0.05"/>"#,
     );
     for xml in [own, class] {
-        // The motions differ at first: an engine begins a filter at the command before the gain.
         let model = refined(&xml, &[], &["actuator-gain@hold:gain=0.8"]);
+        let ([_, left], [_, without]) = distances(&model, &[]);
+        assert!(left < EXACT, "{left} of {without}");
         let written = exported(&model).xml;
         let filter = r#"gainprm="6.4" biastype="affine" biasprm="0 -8 -0.4" dyntype="filterexact" dynprm="0.05""#;
         assert!(written.contains(filter), "{written}");

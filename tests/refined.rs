@@ -4,8 +4,9 @@
 #![allow(clippy::unwrap_used)]
 
 use asid::core::registry::{BackendEntry, all};
-use asid::core::simulator::{StepHook, StepView};
-use asid::core::{Backend, BatchConfig, Capabilities, Control, Rollout, Scene, Simulator};
+use asid::core::simulator::{ParameterChange, StepHook, StepView};
+use asid::core::{Backend, BatchConfig, Capabilities, Control, Model, Rollout, Scene, Simulator};
+use asid::effects::refined::Refined;
 
 /// A block that slides on a floor along x.
 const BLOCK: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.001" cone="elliptic" impratio="10"/>
@@ -81,5 +82,52 @@ fn a_hook_changes_friction_from_step_to_step_and_for_a_rollout_only() {
             backend.name()
         );
         assert_eq!(rest(&mut *simulator, None), plain, "{}", backend.name());
+    }
+}
+
+/// A stone in free flight.
+const STONE: &str = r#"<mujoco><option timestep="0.001"/><worldbody><body name="stone"><freejoint name="free"/>
+  <geom size="0.1" mass="2" contype="0" conaffinity="0"/></body></worldbody></mujoco>"#;
+
+/// Symptom: a parameter that changes within a rollout was another one, or refused. Cause: its
+/// column was handed to the engine, whose columns do not count those of effects.
+#[test]
+fn a_change_within_a_rollout_is_of_the_callers_column() {
+    let needed = Capabilities::STEP_HOOKS
+        | Capabilities::PARAMETER_CHANGES
+        | Capabilities::MASS_PARAMETERS
+        | Capabilities::FREE_BODIES;
+    for backend in engines(needed) {
+        let scene = Scene::from_xml("stone", STONE, &[]).unwrap();
+        let force = "constant-force@stone:x=1".parse().unwrap();
+        let model = Refined::load(&*backend, &scene, &[force]).unwrap();
+        let targets = ["effect/constant-force@stone/x", "option/gravity/2"];
+        let config = BatchConfig {
+            size: 1,
+            threads: 1,
+            targets: targets.iter().map(|t| t.parse().unwrap()).collect(),
+        };
+        let mut simulator = model.simulator(&config).unwrap();
+        let recording = model.layout().recording(&["qvel.free"]).unwrap();
+        // From 40 ms of 100 on, the value is -1.
+        let mut run = |column: usize| {
+            let changes = [ParameterChange {
+                frame: 4,
+                column,
+                values: &[-1.0],
+            }];
+            let mut rollout = Rollout::new(&[0], 10, 10, Control::Shared(&[]), &recording);
+            rollout.changes = &changes;
+            simulator.reset(&[0]).unwrap();
+            let mut out = [0.0; 10 * 6];
+            let done = simulator.rollout(&rollout, &mut out);
+            done.map(|()| [out[54], out[56]])
+        };
+        let [x, z] = run(1).unwrap();
+        assert!((x - 0.1 / 2.0).abs() < 1e-4, "{}: {x}", backend.name());
+        let fall = 0.04 * 9.81 + 0.06;
+        assert!((z + fall).abs() < 1e-4, "{}: {z}", backend.name());
+        let error = run(0).unwrap_err().to_string();
+        assert!(error.contains("an effect has or uses it"), "{error}");
     }
 }

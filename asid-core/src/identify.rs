@@ -28,8 +28,13 @@ pub struct Identified {
     /// Convergence of the search.
     pub iterations: Vec<IterationSummary>,
     /// Root mean square of the whitened residual at the best fit: 1 where the simulator explains
-    /// the readings as well as their noise allows.
+    /// the readings as well as their noise allows. Roughness adds to it, since the machine's own
+    /// scatter is in the readings.
     pub residual: f64,
+    /// Root mean square of the residual at the best fit, in units of noise and roughness together:
+    /// near 1 where the simulator explains the readings, rough or not. `None` where nothing was
+    /// fitted to the readings.
+    pub misfit: Option<f64>,
     /// Root-mean-square scatter of nearby simulations due to contact, in units of the readings'
     /// noise; 0 where it was not measured.
     pub roughness: f64,

@@ -4,6 +4,8 @@
 //! Includes are spliced in as text when it is read, not by an engine. Every engine therefore sees
 //! the same bytes, and `asid export` writes exactly what was simulated.
 
+mod normal_form;
+
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -11,6 +13,7 @@ use asid_documents::guard::{guarded, one_line};
 use asid_documents::xml::{Fault, parse, spliced, wrong_eulerseq};
 
 use crate::error::{Error, Result};
+use normal_form::normal_form;
 
 /// One MJCF document with its includes spliced in.
 #[derive(Clone)]
@@ -126,17 +129,19 @@ impl Scene {
     /// The parsed document with defaults resolved, for what is read from a scene without an engine
     /// (kinematics, mass properties, names).
     ///
-    /// It is parsed once. A solver makes an arm's controller for each attempt, which then costs no
-    /// parsing.
+    /// It means what MuJoCo compiles: classes count entry by entry, and frames move whatever is in
+    /// them. It is parsed once. A solver makes an arm's controller for each attempt, which then
+    /// costs no parsing.
     ///
     /// # Errors
-    /// When the document is not valid MJCF.
+    /// When the document is not valid MJCF, or a `<frame>` holds an `<attach>`.
     pub fn description(&self) -> Result<Arc<mjcf_rs::Model>> {
         if let Some(parsed) = self.description.get() {
             return Ok(Arc::clone(parsed));
         }
         let base = self.directory.clone().unwrap_or_default();
-        let parse = || mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| e.to_string());
+        let xml = normal_form(&self.name, &self.xml)?;
+        let parse = || mjcf_rs::Model::from_str(&xml, &base).map_err(|e| e.to_string());
         let parsed = guarded("an MJCF document", parse).map_err(|message| Error::Scene {
             scene: self.name.clone(),
             message: one_line(&message),

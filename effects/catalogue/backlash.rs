@@ -54,6 +54,14 @@ impl Effect for Backlash {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
+    fn needs_implicit_damping(&self) -> bool {
+        true
+    }
+
+    fn takes_drive(&self) -> bool {
+        true
+    }
+
     fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
         let [width] = values(site)?;
         let joint = document.joint(site.name)?;

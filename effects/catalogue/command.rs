@@ -5,7 +5,7 @@ use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::native::NativeModel;
-use asid_mjcf::plant::{Drive, DriveLaw};
+use asid_mjcf::plant::{Drive, DriveLaw, ForceLimit};
 
 use super::drive::{DriveAt, gains};
 use super::{actuators, at_least, drives, target, values};
@@ -48,8 +48,6 @@ crate::register!(EffectEntry {
 });
 
 /// `gain * command + bias`, one of the two being its parameter.
-///
-/// The command is clamped to its range first.
 struct Affine {
     parameters: &'static [EffectParameter],
     scaled: bool,
@@ -57,7 +55,6 @@ struct Affine {
 
 struct AffineAt {
     actuator: usize,
-    range: [f64; 2],
     gain: f64,
     bias: f64,
 }
@@ -65,7 +62,7 @@ struct AffineAt {
 impl Acting for AffineAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let command = &mut view.ctrl[self.actuator];
-        *command = self.gain * command.clamp(self.range[0], self.range[1]) + self.bias;
+        *command = self.gain * *command + self.bias;
     }
 }
 
@@ -97,12 +94,8 @@ impl Effect for Affine {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [value] = values(site)?;
-        let layout = &site.plant.layout;
-        let actuator = layout.actuator(site.name)?;
-        let range = layout.actuators[actuator].ctrl_range;
         Ok(Box::new(AffineAt {
-            actuator,
-            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            actuator: site.plant.layout.actuator(site.name)?,
             gain: if self.scaled { value } else { 1.0 },
             bias: if self.scaled { 0.0 } else { value },
         }))
@@ -175,6 +168,14 @@ impl Effect for Saturation {
 
     fn needs(&self) -> Capabilities {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn force_limit(&self, values: &[f64]) -> Option<ForceLimit> {
+        let force = *values.first()?;
+        Some(ForceLimit {
+            force,
+            speed: f64::INFINITY,
+        })
     }
 
     fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {

@@ -55,8 +55,19 @@ impl Effect for Compliance {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
+    fn needs_implicit_damping(&self) -> bool {
+        true
+    }
+
+    fn takes_drive(&self) -> bool {
+        true
+    }
+
     fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
         let [compliance, loss] = values(site)?;
+        if compliance == 0.0 {
+            return Ok(Native::Whole);
+        }
         let joint = document.joint(site.name)?;
         if joint.series.is_some() {
             return Ok(Native::LeftOut(

@@ -10,43 +10,49 @@ use super::{at_least, target, values};
 crate::register!(EffectEntry {
     name: "contact-restitution",
     about: "a contact bounces more or less: its damping is smaller or larger",
-    make: || Box::new(Softness { entry: 1 }),
+    make: || Box::new(Softness::Damping),
 });
 
 crate::register!(EffectEntry {
     name: "contact-stiffness",
     about: "a contact is stiffer or softer",
-    make: || Box::new(Softness { entry: 0 }),
+    make: || Box::new(Softness::Stiffness),
 });
 
-/// Stiffness (entry 0 of `solref`) or damping (entry 1) times `factor`.
+/// Stiffness `k` or damping `b` of a contact times `factor`; the other one stays.
 ///
 /// It applies to a geom and all that can touch it, since a contact mixes the numbers of its two
 /// geoms.
 ///
-/// `solref` is `(-stiffness, -damping)` where its numbers are negative. Where they are positive it
-/// is a time constant, which scales with the inverse square root of the stiffness, and a damping
-/// ratio.
-struct Softness {
-    entry: usize,
+/// `solref` is `(-k, -b)` where its numbers are negative. Where they are positive it is a time
+/// constant `t` and a damping ratio `z`, with `b` in proportion to `1 / t` and `k` to
+/// `1 / (t z)²`.
+#[derive(Clone, Copy)]
+enum Softness {
+    Stiffness,
+    Damping,
 }
 
 struct SoftnessAt {
+    /// Both columns of each geom.
     columns: Vec<usize>,
-    entry: usize,
+    softness: Softness,
     factor: f64,
 }
 
 impl Acting for SoftnessAt {
     fn set(&self, columns: &mut [f64]) {
-        for &column in &self.columns {
-            let value = &mut columns[column];
-            let is_time = self.entry == 0 && *value > 0.0;
-            *value *= if is_time {
-                self.factor.sqrt().recip()
-            } else {
-                self.factor
+        for pair in self.columns.chunks_exact(2) {
+            let is_time = columns[pair[0]] > 0.0;
+            let factors = match (self.softness, is_time) {
+                (Softness::Stiffness, false) => [self.factor, 1.0],
+                (Softness::Stiffness, true) => [1.0, self.factor.sqrt().recip()],
+                (Softness::Damping, false) => [1.0, self.factor],
+                (Softness::Damping, true) => [self.factor.recip(), self.factor],
             };
+            for (&column, factor) in pair.iter().zip(factors) {
+                columns[column] *= factor;
+            }
         }
     }
 }
@@ -71,7 +77,7 @@ impl Effect for Softness {
         let others = partners(plant, geom, 0);
         let geoms = std::iter::once(geom).chain(others);
         geoms
-            .map(|g| target("geom", &plant.layout.geoms[g], "solref", self.entry))
+            .flat_map(|g| [0, 1].map(|i| target("geom", &plant.layout.geoms[g], "solref", i)))
             .collect()
     }
 
@@ -83,7 +89,7 @@ impl Effect for Softness {
         let [factor] = values(site)?;
         Ok(Box::new(SoftnessAt {
             columns: site.columns.to_vec(),
-            entry: self.entry,
+            softness: *self,
             factor: at_least(site, "factor", factor, 1e-6)?,
         }))
     }

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use crate::Site;
+use crate::{Acting, Site};
 use asid_core::simulator::StepView;
 use asid_core::{Result, Target};
 use asid_mjcf::Plant;
@@ -80,16 +80,11 @@ impl DriveAt {
     }
 
     /// Takes over the gains of the simulation.
-    ///
-    /// The document's gains stay where an effect of the transmission has already taken the drive
-    /// from the joint and left zeros.
     pub fn set(&self, columns: &[f64]) {
         let gains = self.columns.iter().map(|&c| columns[c]);
-        if gains.clone().any(|gain| gain != 0.0) {
-            let mut drive = self.drive.get();
-            drive.law = with_gains(drive.law, gains);
-            self.drive.set(drive);
-        }
+        let mut drive = self.drive.get();
+        drive.law = with_gains(drive.law, gains);
+        self.drive.set(drive);
     }
 
     /// Force on the joint that the command asks for (N or N m), within the drive's own limits.
@@ -119,5 +114,44 @@ impl DriveAt {
         let taken = drive.gear * drive.gear * kv;
         view.force[self.dof] -= taken * v;
         view.parameters[damping] -= taken;
+    }
+}
+
+/// Lets a drive have a command beyond its range.
+///
+/// The range limits the command that a drive is given. What effects make of it is behind that
+/// limit: a motor that is stronger than its model is so at the end of its range too. Engines hold
+/// the command that effects leave within the range, so the rest of the force is added at the joint.
+pub struct BeyondRange {
+    drive: DriveAt,
+    range: [f64; 2],
+}
+
+impl BeyondRange {
+    /// The drive of an actuator with the columns of its [`gains`]; `None` for one without a range.
+    pub fn new(plant: &Plant, actuator: usize, columns: &[usize]) -> Option<Self> {
+        let range = plant.layout.actuators[actuator].ctrl_range?;
+        let drive = plant.drives[actuator]?;
+        let mut columns = columns.iter().copied();
+        Some(Self {
+            drive: DriveAt::new(plant, actuator, drive, &mut columns),
+            range,
+        })
+    }
+}
+
+impl Acting for BeyondRange {
+    fn set(&self, columns: &mut [f64]) {
+        self.drive.set(columns);
+    }
+
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let command = view.ctrl[self.drive.actuator];
+        let held = command.clamp(self.range[0], self.range[1]);
+        if held != command {
+            let asked = self.drive.force(view);
+            view.ctrl[self.drive.actuator] = held;
+            view.force[self.drive.dof] += asked - self.drive.force(view);
+        }
     }
 }

@@ -18,13 +18,11 @@ crate::register!(EffectEntry {
 ///
 /// This is the play operator (M. Krasnosel'skii, A. Pokrovskii, "Systems with Hysteresis", 1989),
 /// and Simulink's Backlash block. It begins in the middle of the play, with the first command as
-/// its output. The command is clamped to its range first. Play between a drive and its load is
-/// another effect, `backlash`.
+/// its output. Play between a drive and its load is another effect, `backlash`.
 struct Hysteresis;
 
 struct HysteresisAt {
     actuator: usize,
-    range: [f64; 2],
     half: f64,
     /// The last output.
     level: Option<f64>,
@@ -33,7 +31,7 @@ struct HysteresisAt {
 impl Acting for HysteresisAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let command = &mut view.ctrl[self.actuator];
-        let u = command.clamp(self.range[0], self.range[1]);
+        let u = *command;
         let level = self.level.unwrap_or(u);
         *command = level.clamp(u - self.half, u + self.half);
         self.level = Some(*command);
@@ -74,12 +72,8 @@ impl Effect for Hysteresis {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [width] = values(site)?;
-        let layout = &site.plant.layout;
-        let actuator = layout.actuator(site.name)?;
-        let range = layout.actuators[actuator].ctrl_range;
         Ok(Box::new(HysteresisAt {
-            actuator,
-            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            actuator: site.plant.layout.actuator(site.name)?,
             half: at_least(site, "width", width, 0.0)? / 2.0,
             level: None,
         }))

@@ -26,7 +26,7 @@ pub mod command_dynamics;
 pub mod compliance;
 pub mod contact_friction;
 pub mod contact_softness;
-mod drive;
+pub(crate) mod drive;
 mod dry;
 pub mod episode_offset;
 pub mod friction_field;

@@ -10,7 +10,7 @@ use crate::{Acting, Site};
 use asid_core::simulator::StepView;
 use asid_core::{Result, Target};
 use asid_mjcf::Plant;
-use asid_mjcf::plant::{Drive, DriveLaw};
+use asid_mjcf::plant::{Drive, DriveLaw, ForceLimit};
 
 use super::drive::gains;
 use super::target;
@@ -59,6 +59,8 @@ pub struct MotorSide {
     armature: usize,
     gains: Vec<usize>,
     drive: Drive,
+    /// Limits of its force by other effects.
+    force_limits: Vec<ForceLimit>,
     timestep: f64,
     between: Between,
     /// Rotor inertia and gains of the simulation, from before the joint's were set to zero.
@@ -106,6 +108,8 @@ impl MotorSide {
                 site.name
             )));
         };
+        let limits = site.plant.force_limits.iter();
+        let of_drive = limits.filter(|(of, _)| *of == actuator);
         Ok(Self {
             actuator,
             qpos: joint.qpos,
@@ -114,6 +118,7 @@ impl MotorSide {
             armature: site.columns[1],
             gains: site.columns[2..].to_vec(),
             drive: *drive,
+            force_limits: of_drive.map(|(_, limit)| *limit).collect(),
             timestep: site.plant.layout.timestep,
             between: Between::default(),
             inertia: Cell::new(0.0),
@@ -124,10 +129,6 @@ impl MotorSide {
     }
 
     fn law(&self, command: f64) -> Law {
-        let command = match self.drive.ctrl_range {
-            Some([low, high]) => command.clamp(low, high),
-            None => command,
-        };
         let (g, kp, kv) = (self.drive.gear, self.kp.get(), self.kv.get());
         match self.drive.law {
             DriveLaw::Motor => Law {
@@ -156,12 +157,36 @@ impl MotorSide {
         }
     }
 
-    /// Limits of the drive's force on the joint.
-    fn limits(&self) -> Option<[f64; 2]> {
-        self.drive.force_range.map(|range| {
+    /// The force of the drive where its law asks for one, at a speed of the rotor; and its law
+    /// there, if it is at a limit.
+    fn limited(&self, asked: f64, speed: f64) -> (f64, Option<Law>) {
+        let constant = |a: f64| Some(Law { a, b: 0.0, d: 0.0 });
+        let (mut force, mut law) = (asked, None);
+        if let Some(range) = self.drive.force_range {
             let [x, y] = range.map(|f| f * self.drive.gear);
-            [x.min(y), x.max(y)]
-        })
+            let [low, high] = [x.min(y), x.max(y)];
+            if force < low || force > high {
+                force = if force < low { low } else { high };
+                law = constant(force);
+            }
+        }
+        for limit in &self.force_limits {
+            let most = limit.at(speed);
+            if force.abs() > most {
+                force = most.copysign(force);
+                law = if force * speed > 0.0 {
+                    // The fall with speed is a damper of the rotor.
+                    Some(Law {
+                        a: limit.force.copysign(force),
+                        b: 0.0,
+                        d: limit.force / limit.speed,
+                    })
+                } else {
+                    constant(force)
+                };
+            }
+        }
+        (force, law)
     }
 }
 
@@ -187,20 +212,13 @@ impl Acting for MotorSide {
         let rotor = match &self.state {
             Some((rotor, Some(begun))) => transmission.complete(begun, *rotor, q),
             Some((rotor, None)) => *rotor,
-            None => transmission.settled(law, q, v),
+            None => transmission.settled(law, |asked| self.limited(asked, v).0, q, v),
         };
         let mut begun = transmission.begin(law, rotor, q, v);
-        if let Some([low, high]) = self.limits() {
-            let [angle, speed] = transmission.complete(&begun, rotor, q + v * self.timestep);
-            let asked = law.a - law.b * angle - law.d * speed;
-            if asked < low || asked > high {
-                let held = Law {
-                    a: asked.clamp(low, high),
-                    b: 0.0,
-                    d: 0.0,
-                };
-                begun = transmission.begin(held, rotor, q, v);
-            }
+        let [angle, speed] = transmission.complete(&begun, rotor, q + v * self.timestep);
+        let asked = law.a - law.b * angle - law.d * speed;
+        if let (_, Some(held)) = self.limited(asked, rotor[1]) {
+            begun = transmission.begin(held, rotor, q, v);
         }
         if self.drive.law == DriveLaw::Motor {
             view.ctrl[self.actuator] = 0.0;

@@ -4,6 +4,7 @@ use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, S
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
+use asid_mjcf::plant::ForceLimit;
 
 use super::command::{UNLIMITED, limit_targets};
 use super::drive::DriveAt;
@@ -42,8 +43,7 @@ struct SpeedLimit;
 struct SpeedLimitAt {
     drive: DriveAt,
     damping: usize,
-    force: f64,
-    speed: f64,
+    limit: ForceLimit,
 }
 
 impl Acting for SpeedLimitAt {
@@ -53,14 +53,14 @@ impl Acting for SpeedLimitAt {
 
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let v = view.qvel[self.drive.dof];
-        let most = self.force * (1.0 - v.abs() / self.speed).max(0.0);
+        let most = self.limit.at(v);
         let asked = self.drive.force(view);
         if asked.abs() <= most {
             return;
         }
         self.drive.hold(view, most.copysign(asked), self.damping);
         if asked * v > 0.0 && most > 0.0 {
-            let fall = self.force / self.speed;
+            let fall = self.limit.force / self.limit.speed;
             view.force[self.drive.dof] += fall * v;
             view.parameters[self.damping] += fall;
         }
@@ -102,18 +102,27 @@ impl Effect for SpeedLimit {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
+    fn force_limit(&self, values: &[f64]) -> Option<ForceLimit> {
+        let [force, speed] = *values else {
+            return None;
+        };
+        Some(ForceLimit { force, speed })
+    }
+
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [force, speed] = values(site)?;
         Ok(Box::new(SpeedLimitAt {
             drive: DriveAt::of_site(site, 1)?,
             damping: site.columns[0],
-            force: at_least(site, "force", force, 0.0)?,
-            speed: at_least(site, "speed", speed, 1e-9)?,
+            limit: ForceLimit {
+                force: at_least(site, "force", force, 0.0)?,
+                speed: at_least(site, "speed", speed, 1e-9)?,
+            },
         }))
     }
 }
 
-/// A gain of the command that changes over time, at least 0, after the command's range.
+/// A gain of the command that changes over time, at least 0.
 ///
 /// An emptying battery has a negative rate; a drive that warms up has either sign.
 ///
@@ -127,7 +136,6 @@ enum Supply {
 
 struct SupplyAt {
     actuator: usize,
-    range: [f64; 2],
     /// Gain at the beginning of the episode.
     first: f64,
     /// Growth per second.
@@ -137,8 +145,7 @@ struct SupplyAt {
 impl Acting for SupplyAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let gain = (self.first + self.rate * view.time).max(0.0);
-        let command = &mut view.ctrl[self.actuator];
-        *command = gain * command.clamp(self.range[0], self.range[1]);
+        view.ctrl[self.actuator] *= gain;
     }
 }
 
@@ -177,16 +184,12 @@ impl Effect for Supply {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [rate] = values(site)?;
-        let layout = &site.plant.layout;
-        let actuator = layout.actuator(site.name)?;
-        let range = layout.actuators[actuator].ctrl_range;
         let (first, rate) = match self {
             Self::Drift => (1.0, rate),
             Self::Trend => (1.0 + rate * site.episode as f64, 0.0),
         };
         Ok(Box::new(SupplyAt {
-            actuator,
-            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            actuator: site.plant.layout.actuator(site.name)?,
             first,
             rate,
         }))

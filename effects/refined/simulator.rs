@@ -5,12 +5,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use asid_core::error::{Error, Result};
 use asid_core::layout::{Channel, Layout, Recording};
 use asid_core::simulator::{
-    Rollout, Simulator, Snapshot, Status, StepHook, StepView, check_len, check_sims,
+    ParameterChange, Rollout, Simulator, Snapshot, Status, StepHook, StepView, check_len,
+    check_sims,
 };
-use asid_mjcf::plant::Plant;
 
 use super::Placed;
-use crate::{Acting, Acts, Site};
+use super::rows::{Effects, Row};
 
 /// What a column of a batch sets.
 #[derive(Clone, Copy, Debug)]
@@ -23,16 +23,13 @@ pub enum Column {
     Episode,
 }
 
-/// Effects of one simulation; `None` where an effect has its null values.
-type Row = Vec<Option<Box<dyn Acting>>>;
-
 /// A batch whose simulations have effects.
 pub struct RefinedSimulator {
     inner: Box<dyn Simulator>,
-    plant: Arc<Plant>,
+    effects: Effects,
     placed: Arc<Vec<Placed>>,
-    /// Columns of the engine's batch that hold each effect's targets.
-    places: Vec<Vec<usize>>,
+    /// Ranges of commands, by the index of the actuator.
+    ranges: Vec<(usize, [f64; 2])>,
     columns: Vec<Column>,
     /// Values of the engine's columns before any effect.
     base: Vec<f64>,
@@ -66,24 +63,26 @@ fn lock(row: &Mutex<Row>) -> std::sync::MutexGuard<'_, Row> {
 }
 
 impl RefinedSimulator {
-    /// Gives the engine's batch `inner` the effects `placed`.
+    /// Gives the engine's batch `inner` some effects.
     ///
-    /// `places` are the columns of `inner` that hold each effect's targets, `base` the values of
-    /// the columns of `inner` before any effect, and `columns` what the caller sets.
+    /// `base` are the values of the columns of `inner` before any effect, and `columns` what the
+    /// caller sets.
     pub(super) fn new(
         inner: Box<dyn Simulator>,
-        (plant, placed): (Arc<Plant>, Arc<Vec<Placed>>),
-        (places, base): (Vec<Vec<usize>>, Vec<f64>),
+        effects: Effects,
+        base: Vec<f64>,
         columns: Vec<Column>,
     ) -> Result<Self> {
         let size = inner.batch_size();
+        let actuators = effects.plant.layout.actuators.iter().enumerate();
+        let ranges = actuators.filter_map(|(i, actuator)| Some((i, actuator.ctrl_range?)));
         Ok(Self {
             state: inner.layout().recording(&inner.layout().state_channels())?,
             before: Vec::new(),
             inner,
-            plant,
-            placed,
-            places,
+            ranges: ranges.collect(),
+            placed: Arc::clone(&effects.placed),
+            effects,
             columns,
             base,
             steps: vec![0; size],
@@ -180,6 +179,29 @@ impl RefinedSimulator {
         Ok(())
     }
 
+    /// The changes of a rollout, with the columns of the engine's batch.
+    ///
+    /// # Errors
+    /// When an effect has or uses such a column: it would act by the value from before.
+    fn changes<'c>(&self, changes: &[ParameterChange<'c>]) -> Result<Vec<ParameterChange<'c>>> {
+        let of_engine = |change: &ParameterChange<'c>| match self.columns.get(change.column) {
+            Some(&Column::Model(column)) if !self.effects.uses(column) => {
+                Ok(ParameterChange { column, ..*change })
+            }
+            Some(_) => Err(Error::Failed(format!(
+                "parameter change of column {} at frame {}: an effect has or uses it; end the rollout there, and call \
+                 set_parameters",
+                change.column, change.frame
+            ))),
+            None => Err(Error::Shape(format!(
+                "parameter change of column {} of {}",
+                change.column,
+                self.columns.len()
+            ))),
+        };
+        changes.iter().map(of_engine).collect()
+    }
+
     /// Applies the effects on sensors to rows of a simulation's readings.
     ///
     /// The first row is `first` physics steps after the beginning of its episode, and each further
@@ -217,6 +239,7 @@ impl RefinedSimulator {
 /// The hook of a rollout: the effects of each row, then the caller's own hook.
 struct RowHook<'a> {
     rows: &'a [Mutex<Row>],
+    ranges: &'a [(usize, [f64; 2])],
     sims: &'a [usize],
     passed: &'a [u64],
     timestep: f64,
@@ -227,6 +250,10 @@ impl StepHook for RowHook<'_> {
     fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
         let sim = self.sims[row];
         view.time += self.passed[sim] as f64 * self.timestep;
+        // A range limits the command that is given, and effects act behind it.
+        for &(actuator, [low, high]) in self.ranges {
+            view.ctrl[actuator] = view.ctrl[actuator].clamp(low, high);
+        }
         for acting in lock(&self.rows[sim]).iter_mut().flatten() {
             acting.before_step(view);
         }
@@ -263,33 +290,7 @@ impl Simulator for RefinedSimulator {
                     Column::Episode => episode = value as usize,
                 }
             }
-            let mut row = Row::with_capacity(given.len());
-            for ((placed, values), columns) in self.placed.iter().zip(&given).zip(&self.places) {
-                let null = placed.effect.parameters().iter().map(|p| p.null);
-                if !values.is_empty() && null.eq(values.iter().copied()) {
-                    row.push(None);
-                    continue;
-                }
-                let acting = placed.effect.attach(&Site {
-                    plant: &self.plant,
-                    name: &placed.site,
-                    values,
-                    columns,
-                    episode,
-                })?;
-                row.push(Some(acting));
-            }
-            // Effects on the model come first: others may depend on their values or take them over.
-            for of_model in [true, false] {
-                for (acting, placed) in row.iter().zip(self.placed.iter()) {
-                    if let Some(acting) = acting
-                        && (placed.effect.acts() == Acts::Model) == of_model
-                    {
-                        acting.set(&mut engine[first..]);
-                    }
-                }
-            }
-            rows.push(row);
+            rows.push(self.effects.row(&given, episode, &mut engine[first..])?);
         }
         self.inner.set_parameters(sims, &engine)?;
         for (&sim, row) in sims.iter().zip(rows) {
@@ -325,12 +326,15 @@ impl Simulator for RefinedSimulator {
         check_sims(rollout.sims, self.batch_size())?;
         let hook = RowHook {
             rows: &self.rows,
+            ranges: &self.ranges,
             sims: rollout.sims,
             passed: &self.passed,
             timestep: self.inner.layout().timestep,
             then: rollout.hook,
         };
+        let changes = self.changes(rollout.changes)?;
         let mut with = *rollout;
+        with.changes = &changes;
         let busy = rollout
             .sims
             .iter()

@@ -118,14 +118,9 @@ impl Writer<'_, '_> {
             self.write_delay(node, asked.delay);
         }
         if let Some(limit) = asked.limit {
-            self.write_limit(
-                node,
-                limit / gear.abs(),
-                drive.force_range.filter(|_| {
-                    // A drive stores the limits of a motor with a gain before that gain.
-                    !matches!(drive.law, DriveLaw::Motor) || drive.gear == declared
-                }),
-            );
+            let own = self.entries("actuator", name, "forcerange", 2)?;
+            let own = own.map_or(drive.own_force_range(), |ends| Some([ends[0], ends[1]]));
+            self.write_limit(node, limit / gear.abs(), own);
         }
         Ok(())
     }

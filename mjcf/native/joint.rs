@@ -12,13 +12,36 @@ use super::{NativeJoint, Spring, Writer};
 /// At its default of 20 ms a joint that should stand still glides.
 const FRICTION_TIME: f64 = 2.0;
 
+/// The attribute that states a joint's stiffness and damping by a time constant and a ratio.
+const SPRING_DAMPER: &str = "springdamper";
+
+/// Whether a joint, or a class for joints, has its stiffness and damping from a time constant and a
+/// ratio; `None` if it does not say.
+fn spring_damper(node: Node<'_, '_>) -> Option<bool> {
+    let text = node.attribute(SPRING_DAMPER);
+    let numbers = text.filter(|_| node.has_tag_name("joint"))?;
+    let mut numbers = numbers.split_whitespace().map(str::parse::<f64>);
+    Some(numbers.all(|x| x.is_ok_and(|x| x > 0.0)))
+}
+
 impl Writer<'_, '_> {
     pub(super) fn write_joints(&mut self) -> Result<()> {
         for i in 0..self.native.plant.layout.joints.len() {
             let joint = self.native.plant.layout.joints[i].clone();
             let node = self.elements.joints[i];
+            let damped = self.elements.said(node, spring_damper) == Some(true);
+            if damped {
+                // From it MuJoCo would compute other coefficients for each mass and armature, and
+                // override those beside it.
+                self.markup.set(node, SPRING_DAMPER, "0 0");
+            }
             for attribute in ["damping", "stiffness", "armature"] {
-                if let Some(values) = self.entries("joint", &joint.name, attribute, 1)? {
+                let mut values = self.entries("joint", &joint.name, attribute, 1)?;
+                if values.is_none() && damped && attribute != "armature" {
+                    let compiled = Target::new("joint", &joint.name, attribute, 0);
+                    values = Some(vec![self.model.nominal(&compiled)?]);
+                }
+                if let Some(values) = values {
                     // Coefficients of higher order may follow the first.
                     let said = node.attribute(attribute).unwrap_or_default();
                     let rest = said.split_whitespace().skip(1);
@@ -45,7 +68,7 @@ impl Writer<'_, '_> {
             let asked = self.native.joints.get(&i).cloned().unwrap_or_default();
             self.write_friction(&joint.name, node, &asked)?;
             if !asked.springs.is_empty() {
-                self.write_springs(&joint.name, node, &asked.springs, unit)?;
+                self.write_springs(i, node, &asked.springs, unit)?;
             }
         }
         Ok(())
@@ -72,16 +95,28 @@ impl Writer<'_, '_> {
         Ok(())
     }
 
+    /// Where the spring of a joint rests, rad or m: by the engine, or by the document where the
+    /// engine has no such target.
+    fn rest(&self, i: usize, name: &str) -> Result<f64> {
+        if let Ok(rest) = self.value(&Target::new("joint", name, "springref", 0)) {
+            return Ok(rest);
+        }
+        let document = self.scene.description()?;
+        let mut joints = document.bodies.iter().flat_map(|b| &b.body.joints);
+        Ok(joints.nth(i).map_or(0.0, |joint| joint.springref))
+    }
+
     /// One spring of several in parallel: stiffnesses add, and it rests at their weighted mean.
     fn write_springs(
         &mut self,
-        name: &str,
+        i: usize,
         node: Node<'_, '_>,
         springs: &[Spring],
         unit: f64,
     ) -> Result<()> {
+        let name = &*self.native.plant.layout.joints[i].name;
         let stiffness = self.value(&Target::new("joint", name, "stiffness", 0))?;
-        let rest = self.value(&Target::new("joint", name, "springref", 0))?;
+        let rest = self.rest(i, name)?;
         let own = Spring {
             stiffness,
             rest,

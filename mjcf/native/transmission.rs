@@ -50,6 +50,12 @@ impl Writer<'_, '_> {
             ));
             return Ok(String::new());
         }
+        if self.is_coupled(&name) {
+            self.leave_out(format!(
+                "joint `{name}` is coupled by an <equality>: the document couples the drive's side of its play or \
+                 elasticity, and the model couples the link"
+            ));
+        }
         let label = self.native.plant.layout.actuators[actuator].name.clone();
         let timestep = self.native.plant.layout.timestep;
         let get = |w: &Self, attribute: &str| w.value(&Target::new("joint", &name, attribute, 0));
@@ -61,6 +67,8 @@ impl Writer<'_, '_> {
             DriveLaw::Velocity { .. } => (0.0, value(self, "kv")?),
             DriveLaw::Motor => (0.0, 0.0),
         };
+        let gear = Target::new("actuator", &label, "gear", 0);
+        let drive = drive.with("gear", 0, [self.model.nominal(&gear)?, self.value(&gear)?]);
         let square = drive.gear * drive.gear;
         let rotor = get(self, "armature")?;
         let mut inertia = rotor;
@@ -111,7 +119,7 @@ impl Writer<'_, '_> {
                 numbers(&plant.axis)
             ),
         );
-        let limits = self.move_range(&name, node)?;
+        let limits = self.move_range(i, &name);
         self.move_sensors(i, node, &name);
         self.widen_keyframes(joint.qpos, joint.qvel);
         let friction = if friction > 0.0 {
@@ -128,6 +136,20 @@ impl Writer<'_, '_> {
         ))
     }
 
+    /// Whether an equality constraint couples a joint.
+    fn is_coupled(&self, name: &str) -> bool {
+        let sections = self.elements.root.children();
+        let sections = sections.filter(|n| n.has_tag_name("equality"));
+        let mut couplings = sections
+            .flat_map(|s| s.children())
+            .filter(|n| n.has_tag_name("joint"));
+        couplings.any(|n| {
+            ["joint1", "joint2"]
+                .iter()
+                .any(|end| n.attribute(*end) == Some(name))
+        })
+    }
+
     /// Moves the spring of the joint to the tendon, so that it acts on the link; returns the
     /// tendon's attribute.
     ///
@@ -135,18 +157,10 @@ impl Writer<'_, '_> {
     /// its `springref`.
     fn move_spring(&mut self, i: usize, name: &str) -> Result<String> {
         let node = self.elements.joints[i];
-        let damped = "springdamper";
-        let is_damped = node.has_attribute(damped) || self.elements.default_has("joint", damped);
-        let written = self.markup.get(node, "stiffness");
-        // A `springdamper` overrides the stiffness that stands beside it.
-        let is_overridden = is_damped && written.as_deref() == node.attribute("stiffness");
-        let stiffness = match written.filter(|_| !is_overridden) {
+        let stiffness = match self.markup.get(node, "stiffness") {
             Some(text) => text,
             None => numbers(&[self.value(&Target::new("joint", name, "stiffness", 0))?]),
         };
-        if is_damped {
-            self.markup.set(node, damped, "0 0");
-        }
         let mut coefficients = stiffness.split_whitespace();
         if coefficients.all(|x| x.parse::<f64>().is_ok_and(|x| x == 0.0)) {
             return Ok(String::new());
@@ -156,16 +170,17 @@ impl Writer<'_, '_> {
     }
 
     /// Moves the range of the joint to the tendon; returns the tendon's attributes.
-    fn move_range(&mut self, name: &str, node: Node<'_, '_>) -> Result<String> {
+    fn move_range(&mut self, i: usize, name: &str) -> String {
         let limits: Result<Vec<f64>> = (0..2)
             .map(|k| self.value(&Target::new("joint", name, "range", k)))
             .collect();
-        // An engine has no range of an unlimited joint.
-        let Ok(range) = limits else {
-            return Ok(String::new());
+        // An engine has no range of an unlimited joint, and may have none of any.
+        let stated = self.native.plant.joints[i].range;
+        let Some(range) = limits.ok().or(stated.map(Vec::from)) else {
+            return String::new();
         };
-        self.markup.set(node, "limited", "false");
-        Ok(format!(" limited=\"true\" range=\"{}\"", numbers(&range)))
+        self.markup.set(self.elements.joints[i], "limited", "false");
+        format!(" limited=\"true\" range=\"{}\"", numbers(&range))
     }
 
     /// Makes sensors of the joint read the tendon.

@@ -32,11 +32,58 @@ pub struct Drive {
     pub gear: f64,
     /// Limits of the command.
     pub ctrl_range: Option<[f64; 2]>,
-    /// Limits of the force, before the gear.
+    /// Limits of the force, before the gear: its own, within those of its joint.
     pub force_range: Option<[f64; 2]>,
     /// Whether the document gives it a filter or a delay: its force then follows from earlier
     /// commands too, which [`Drive::force`] does not know.
     pub remembers: bool,
+    /// What its limits follow from.
+    pub(super) limits: Limits,
+}
+
+/// The limits of a drive's force as the document states them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Limits {
+    /// A motor's gain, which the gear of the drive includes; 1 for servos.
+    pub(super) gain: f64,
+    /// The actuator's own (`forcerange`), after that gain and before the gear, N or N m.
+    pub(super) own: Option<[f64; 2]>,
+    /// Those of its joint (`actuatorfrcrange`), N or N m.
+    pub(super) joint: Option<[f64; 2]>,
+}
+
+impl Limits {
+    /// Both limits, before the gain and the gear.
+    pub(super) fn before(&self, gear: f64) -> Option<[f64; 2]> {
+        let over = |[low, high]: [f64; 2], factor: f64| match factor < 0.0 {
+            true => [high / factor, low / factor],
+            false => [low / factor, high / factor],
+        };
+        let own = self.own.map(|range| over(range, self.gain));
+        let joint = self.joint.filter(|_| gear != 0.0);
+        match (own, joint.map(|range| over(range, gear))) {
+            (Some(own), Some([low, high])) => Some(own.map(|end| end.max(low).min(high))),
+            (own, joint) => own.or(joint),
+        }
+    }
+}
+
+/// A limit of a drive's force that falls with the speed of its joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceLimit {
+    /// Largest force on the joint at rest, gear included, N or N m.
+    pub force: f64,
+    /// Speed of the joint at which nothing is left of it, m/s or rad/s; infinite for a limit that
+    /// does not fall.
+    pub speed: f64,
+}
+
+impl ForceLimit {
+    /// The largest force at a speed.
+    #[must_use]
+    pub fn at(&self, speed: f64) -> f64 {
+        self.force * (1.0 - speed.abs() / self.speed).max(0.0)
+    }
 }
 
 impl Drive {
@@ -79,13 +126,20 @@ impl Drive {
             ("kv", DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv }) => *kv = value,
             ("gear", _) if index == 0 && nominal != 0.0 => self.gear *= value / nominal,
             ("forcerange", _) => {
-                if let Some(end) = self.force_range.as_mut().and_then(|r| r.get_mut(index)) {
+                if let Some(end) = self.limits.own.as_mut().and_then(|r| r.get_mut(index)) {
                     *end = value;
                 }
             }
             _ => {}
         }
+        self.force_range = self.limits.before(self.gear);
         self
+    }
+
+    /// The limits of its actuator's own force (`forcerange`), N or N m before the gear.
+    #[must_use]
+    pub fn own_force_range(&self) -> Option<[f64; 2]> {
+        self.limits.own
     }
 
     /// Whether its force follows from the present command, position and speed alone.

@@ -3,10 +3,15 @@
 use super::Plant;
 use asid_core::layout::JointKind;
 
-/// Most bodies in a chain: the size of a buffer.
-const MAX_DEPTH: usize = 64;
-
 impl Plant {
+    /// Visits the bodies from the world, which is left out, to `body`.
+    fn along(&self, body: usize, visit: &mut impl FnMut(usize)) {
+        if body != 0 {
+            self.along(self.bodies[body].parent, visit);
+            visit(body);
+        }
+    }
+
     /// Pose `world_from_body` of a body in a state, and the Jacobian of its point `at`.
     ///
     /// `jacobian` (`6 x nv`, row-major) receives the point's linear, then angular velocity per unit
@@ -21,20 +26,12 @@ impl Plant {
         use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
         let nv = self.layout.nv;
         jacobian.fill(0.0);
-        let mut path = [0_usize; MAX_DEPTH];
-        let mut depth = 0;
-        let mut up = body;
-        while up != 0 && depth < MAX_DEPTH {
-            path[depth] = up;
-            depth += 1;
-            up = self.bodies[up].parent;
-        }
         // Two passes: the pose of the point first, then the columns that need it.
         let mut tip = Vector3::zeros();
         let mut world = Isometry3::identity();
         for pass in 0..2 {
             world = Isometry3::identity();
-            for &b in path[..depth].iter().rev() {
+            self.along(body, &mut |b: usize| {
                 world *= self.poses[b];
                 for j in self.bodies[b].joints.clone() {
                     let (place, joint) = (&self.layout.joints[j], &self.joints[j]);
@@ -102,7 +99,7 @@ impl Plant {
                         }
                     }
                 }
-            }
+            });
             tip = (world * Point3::from(Vector3::from(at))).coords;
         }
         world

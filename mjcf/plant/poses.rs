@@ -76,4 +76,25 @@ mod tests {
             assert!(pose.rotation.angle_to(&chain.rotation) < 1e-7, "{body}");
         }
     }
+
+    /// Symptom: the end of a chain of 80 links was where its last 64 links alone would end.
+    ///
+    /// Cause: the path to a body had 64 places.
+    #[test]
+    fn the_end_of_a_long_chain_is_where_all_its_links_place_it() {
+        let links = 80;
+        let open = r#"<body pos="0.1 0 0"><joint axis="0 1 0"/><geom size="0.01"/>"#.repeat(links);
+        let close = "</body>".repeat(links);
+        let xml = format!("<mujoco><worldbody>{open}{close}</worldbody></mujoco>");
+        let plant = Plant::of(&Scene::from_xml("chain", &xml, &[]).unwrap()).unwrap();
+        let qpos = vec![0.01; links];
+        let mut jacobian = vec![0.0; 6 * links];
+        let chain = plant.point_jacobian(&qpos, links, [0.0; 3], &mut jacobian);
+        let end = plant.poses(&qpos)[links];
+        assert!((end.translation.vector - chain.translation.vector).norm() < 1e-9);
+        // The first hinge turns the end about the y axis through its own place.
+        let arm = end.translation.vector - Vector3::new(0.1, 0.0, 0.0);
+        assert!((jacobian[0] - arm.z).abs() < 1e-9);
+        assert!((jacobian[2 * links] + arm.x).abs() < 1e-9);
+    }
 }

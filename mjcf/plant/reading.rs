@@ -1,14 +1,17 @@
 //! Reads a plant from a scene's document.
 
+use std::collections::BTreeMap;
+
 use mjcf_rs::Model as Document;
 use mjcf_rs::body::{Joint, JointType};
 
-use super::drive::{Drive, law};
+use super::drive::{Drive, Limits, law};
+use super::limits;
 use super::sensor::reads;
 use super::{Plant, PlantBody, PlantGeom, PlantJoint};
 use crate::document;
-use crate::memory;
 use crate::mass::{GeomMass, MassProperties};
+use crate::memory;
 use asid_core::error::Result;
 use asid_core::layout::{JointKind, Layout};
 use asid_core::scene::Scene;
@@ -36,12 +39,17 @@ impl Plant {
                 frictionloss: j.frictionloss,
                 armature: j.armature,
             }));
-            geoms.extend(body.geoms.iter().map(|g| PlantGeom {
-                body: i,
-                friction: g.friction,
-                condim: g.condim,
-                priority: g.priority,
-                has_mass: i > 0 && body.inertial.is_none() && GeomMass::of(g).is_some(),
+            geoms.extend(body.geoms.iter().map(|g| {
+                let mass = GeomMass::of(g).filter(|_| i > 0 && body.inertial.is_none());
+                PlantGeom {
+                    body: i,
+                    friction: g.friction,
+                    condim: g.condim,
+                    priority: g.priority,
+                    has_mass: mass.is_some(),
+                    mass: mass.as_ref().map_or(0.0, |m| m.mass),
+                    center: mass.map_or([0.0; 3], |m| m.position.into()),
+                }
             }));
             let (mass, center) = match &body.inertial {
                 Some(inertial) => {
@@ -72,13 +80,14 @@ impl Plant {
         // Actuators that are attached from another document come after those of this one.
         let remember = memory::of_actuators(scene.xml()).into_iter();
         let remember = remember.chain(std::iter::repeat(false));
+        let of_joints = limits::of_joints(scene.xml(), model.compiler.autolimits);
         let drives = model
             .actuators
             .iter()
             .zip(&layout.actuators)
             .zip(remember)
             .map(|((a, place), remembers)| {
-                let drive = drive(&model, &layout, a, place.ctrl_range)?;
+                let drive = drive(&model, &layout, a, (place.ctrl_range, &of_joints))?;
                 Some(Drive { remembers, ..drive })
             })
             .collect();
@@ -110,6 +119,7 @@ impl Plant {
             drives,
             sensors,
             contacts,
+            force_limits: Vec::new(),
             poses,
         })
     }
@@ -126,11 +136,12 @@ fn range(model: &Document, joint: &Joint) -> Option<[f64; 2]> {
         .filter(|[low, high]| scalar && limited && low < high)
 }
 
+/// The drive of an actuator with a range of its command; `of_joints` are limits of joints.
 fn drive(
     model: &Document,
     layout: &Layout,
     actuator: &mjcf_rs::extras::Actuator,
-    ctrl_range: Option<[f64; 2]>,
+    (ctrl_range, of_joints): (Option<[f64; 2]>, &BTreeMap<String, [f64; 2]>),
 ) -> Option<Drive> {
     let name = actuator.joint.as_deref()?;
     let joint = layout.joints.iter().position(|j| j.name == name)?;
@@ -141,19 +152,27 @@ fn drive(
         return None;
     }
     let (law, gain) = law(actuator)?;
+    let range = document::range(actuator.force_range);
     let limited = actuator
         .force_limited
-        .resolve(model.compiler.autolimits, actuator.force_range.is_some());
+        .resolve(model.compiler.autolimits, range.is_some());
+    // The limit of a joint is one of the sum of its drives' forces.
+    let others = model.actuators.iter().filter(|a| a.joint == actuator.joint);
+    let alone = others.count() == 1;
+    let limits = Limits {
+        gain,
+        own: range.filter(|_| limited),
+        joint: of_joints.get(name).copied().filter(|_| alone),
+    };
+    let gear = gain * actuator.gear[0];
     Some(Drive {
         joint,
         law,
-        gear: gain * actuator.gear[0],
+        gear,
         ctrl_range,
-        force_range: actuator.force_range.filter(|_| limited).map(|range| {
-            let [a, b] = range.map(|force| force / gain);
-            [a.min(b), a.max(b)]
-        }),
+        force_range: limits.before(gear),
         remembers: false,
+        limits,
     })
 }
 

@@ -15,7 +15,7 @@ use asid_effects::{
     Acting, Acts, Confusion, Effect, EffectParameter, Native, Reach, Reference, Site,
 };
 use asid_mjcf::native::NativeModel;
-use asid_mjcf::plant::Plant;
+use asid_mjcf::plant::{ForceLimit, Plant};
 
 use super::super::border::Border;
 use super::{Across, identified};
@@ -174,6 +174,18 @@ impl Effect for Across<Box<dyn Effect>> {
 
     fn steps(&self) -> bool {
         self.run(|effect| effect.steps())
+    }
+
+    fn needs_implicit_damping(&self) -> bool {
+        self.run(|effect| effect.needs_implicit_damping())
+    }
+
+    fn takes_drive(&self) -> bool {
+        self.run(|effect| effect.takes_drive())
+    }
+
+    fn force_limit(&self, values: &[f64]) -> Option<ForceLimit> {
+        self.run(|effect| effect.force_limit(values))
     }
 
     fn remembers_readings(&self) -> bool {

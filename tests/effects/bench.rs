@@ -1,8 +1,10 @@
 //! A scene on each engine, with and without effects.
 
+use std::sync::Arc;
+
 use asid::core::registry::{BackendEntry, all};
 use asid::core::{
-    Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Scene, Simulator,
+    Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Scene, Simulator, Target,
 };
 use asid::effects::EffectEntry;
 use asid::effects::refined::{Refined, counts_episodes, needs};
@@ -42,9 +44,23 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(backend: &dyn Backend, xml: &str, effects: &[&str]) -> Self {
+        Self::with_values(backend, xml, &[], effects)
+    }
+
+    /// The same with other values of some targets than the document's.
+    pub fn with_values(
+        backend: &dyn Backend,
+        xml: &str,
+        values: &[(&str, f64)],
+        effects: &[&str],
+    ) -> Self {
         let scene = scene(xml);
         let specs: Vec<EffectSpec> = effects.iter().map(|e| e.parse().unwrap()).collect();
-        let model = Refined::load(backend, &scene, &specs)
+        let values = values.iter().map(|(t, v)| (t.parse().unwrap(), *v));
+        let values: Vec<(Target, f64)> = values.collect();
+        let plant = Arc::new(Plant::of(&scene).unwrap());
+        let model = backend.load(&scene).unwrap();
+        let model = Refined::new(backend, model, plant, &values, &specs)
             .unwrap_or_else(|e| panic!("{}, {effects:?}: {e}", backend.name()));
         let config = BatchConfig {
             size: 1,
@@ -98,6 +114,13 @@ impl Bench {
     pub fn hold(&mut self, frames: usize, command: &[f64]) -> Vec<Vec<f64>> {
         self.run(1, &vec![command.to_vec(); frames])
     }
+}
+
+/// Engines that support an effect and can load a scene.
+pub fn engines_that_load(effect: &str, xml: &str) -> Vec<Box<dyn Backend>> {
+    let scene = scene(xml);
+    let engines = engines_for(effect).into_iter();
+    engines.filter(|b| b.load(&scene).is_ok()).collect()
 }
 
 /// Runs a check on each engine that supports the effects.

@@ -96,6 +96,65 @@ fn a_constant_force_pushes_at_the_center_of_mass() {
     });
 }
 
+/// Symptom: a force on a body pushed beside its centre of mass where an effect or a study had moved
+/// that.
+///
+/// Cause: the force acted at the centre of the document, and at the places of its links.
+#[test]
+fn a_force_acts_at_the_center_of_mass_of_the_simulation() {
+    let far = ["constant-force@stone:y=1", "center-of-mass@stone:x=0.2"];
+    on_each(&weightless(), &far, |bench| {
+        let row = &bench.run(500, &[vec![]])[0];
+        // It does not rotate: the frame moves with the centre.
+        near(&bench.engine, row[1], 1.0, 5e-3);
+        near(&bench.engine, row[0], 0.0, 1e-3);
+    });
+    let force = "constant-force@flap:x=2";
+    let plate = 0.3 / 3.0 * (0.05_f64.powi(2) + 0.08_f64.powi(2));
+    for (xml, values, effects, drives, own) in [
+        (
+            CART,
+            &[][..],
+            &[force, "center-of-mass@flap:z=-0.1"][..],
+            1,
+            0.02,
+        ),
+        (
+            CART,
+            &[("body/flap/ipos/2", -0.2)][..],
+            &[force][..],
+            1,
+            0.02,
+        ),
+        (
+            PLATE,
+            &[("geom/plate/pos/2", -0.2)][..],
+            &[force][..],
+            0,
+            plate,
+        ),
+    ] {
+        for backend in engines_for("center-of-mass") {
+            let mut bench = Bench::with_values(&*backend, xml, values, effects);
+            let row = &bench.hold(1, &vec![0.0; drives + 1])[0];
+            // Torque about y of a force along x, 0.2 m below the hinge.
+            let expected = -0.2 * 2.0 / (own + 0.3 * 0.2 * 0.2) * DT;
+            near(&bench.engine, row[drives], expected, -2e-3 * expected);
+        }
+    }
+    // The outer link is carried 0.1 m farther out, and the force with it.
+    let values = [("body/outer/pos/0", 0.4)];
+    for backend in engines_for("center-of-mass") {
+        let effects = ["constant-force@outer:z=3"];
+        let mut bench = Bench::with_values(&*backend, LINKS, &values, &effects);
+        let about = 0.002 + 0.3 * 0.01 + 0.001 + 0.5 * 0.4 * 0.4;
+        let torque = G * (0.3 * 0.1 + 0.5 * 0.4) - 3.0 * 0.4;
+        let expected = torque / about * DT;
+        let w = bench.hold(1, &[])[0][0];
+        near(&bench.engine, w, expected, 2e-3 * expected.abs());
+    }
+}
+
 #[test]
 fn a_tilt_makes_things_run_downhill() {
     let (pitch, roll): (f64, f64) = (0.1, -0.2);

@@ -1,6 +1,6 @@
 //! Effects on commands, on a rotor that integrates its torque.
 
-use super::bench::{Bench, near, on_each};
+use super::bench::{Bench, engines_that_load, near, on_each};
 use super::{DT, INERTIA, ROTOR};
 
 /// A stiff, strongly damped servo without load.
@@ -160,5 +160,73 @@ fn play_of_a_command_loses_the_same_at_any_rate() {
             let expected = width * 2.0 * (amplitude - width / 2.0);
             near(&bench.engine, area.abs(), expected, 0.01);
         });
+    }
+}
+
+/// Symptom: a gain above 1 and a bias did nothing at the end of a command's range, and a gain before
+/// a bias was cut off between the two.
+///
+/// Cause: the range, which limits the command that a drive is given, was applied once more to what
+/// the effects made of it.
+#[test]
+fn a_gain_and_a_bias_act_behind_the_range_of_the_command() {
+    let motor = ROTOR.replace(r#"gear="1""#, r#"gear="1" ctrlrange="-1 1""#);
+    for (effects, torque) in [
+        (&["actuator-gain@drive:gain=1.5"][..], 1.5),
+        (&["actuator-bias@drive:bias=0.5"][..], 1.5),
+        (
+            &[
+                "actuator-gain@drive:gain=1.5",
+                "actuator-bias@drive:bias=-0.2",
+            ][..],
+            1.3,
+        ),
+        (
+            &[
+                "actuator-gain@drive:gain=1.5",
+                "actuator-delay@drive:delay=0.01",
+            ][..],
+            1.5,
+        ),
+        (
+            &[
+                "actuator-saturation@drive:limit=1.2",
+                "actuator-gain@drive:gain=1.5",
+            ][..],
+            1.2,
+        ),
+        (&["supply-trend@drive:rate=0.1"][..], 1.0),
+        (&["actuator-gain@drive:gain=0.5"][..], 0.5),
+    ] {
+        on_each(&motor, effects, |bench| {
+            let speed = bench.hold(500, &[3.0])[499][1];
+            near(&bench.engine, speed, torque / INERTIA, 3.0 * bench.rounding);
+        });
+    }
+    // 1.5 of the largest command of 0.5.
+    let servo = SERVO.replace(r#"kv="20""#, r#"kv="20" ctrlrange="-0.5 0.5""#);
+    on_each(&servo, &["actuator-gain@drive:gain=1.5"], |bench| {
+        let angle = bench.hold(6000, &[2.0])[5999][0];
+        near(&bench.engine, angle, 0.75, 1e-3);
+    });
+}
+
+/// Symptom: a drive with a filter or a delay of its own began an episode with the command before a
+/// gain, and moved too fast or too slowly until it had forgotten that.
+///
+/// Cause: the engine filled its memory with the command of the log.
+#[test]
+fn a_filter_or_a_delay_begins_with_the_command_that_reaches_it() {
+    let effect = "actuator-gain@drive:gain=0.5";
+    for own in [
+        r#"<general name="drive" joint="spin" dyntype="filterexact" dynprm="0.1"/>"#,
+        r#"<motor name="drive" joint="spin" delay="0.1" nsample="60"/>"#,
+    ] {
+        let xml = ROTOR.replace(r#"<motor name="drive" joint="spin" gear="1"/>"#, own);
+        assert_ne!(xml, ROTOR);
+        for backend in engines_that_load(effect, &xml) {
+            let speed = Bench::new(&*backend, &xml, &[effect]).hold(100, &[1.0])[99][1];
+            near(own, speed, 0.5 * 100.0 * DT / INERTIA, 1e-9);
+        }
     }
 }

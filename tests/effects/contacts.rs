@@ -162,3 +162,53 @@ fn damping_lowers_the_bounce_and_stiffness_the_sinking_in() {
         near(backend.name(), ratio, 4.0, 0.05);
     }
 }
+
+/// Symptom: less damping of a contact made it stiffer as well, and a stiffer contact was damped more
+/// too, where `solref` is a time constant and a damping ratio.
+///
+/// Cause: each effect changed one of the two numbers, and both properties follow from both.
+#[test]
+fn a_factor_means_the_same_in_both_forms_of_a_contact() {
+    let (time, ratio): (f64, f64) = (0.02, 0.3);
+    let with = |solref: &str| BALL.replace("-40000 -18", solref);
+    let direct = format!("{} {}", -1.0 / (time * ratio).powi(2), -2.0 / time);
+    let forms = [with(&format!("{time} {ratio}")), with(&direct)];
+    let high = [0.0, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0];
+    for effect in ["contact-restitution", "contact-stiffness"] {
+        for factor in [0.4, 1.0, 2.5] {
+            let effect = format!("{effect}@floor:factor={factor}");
+            for backend in engines_for(&effect) {
+                let [a, b] = [&forms[0], &forms[1]].map(|xml| {
+                    let mut bench = Bench::new(&*backend, xml, &[&effect]);
+                    bench.state(&high, &[0.0; 6]).hold(600, &[])
+                });
+                for (a, b) in a.iter().zip(&b) {
+                    near(&effect, a[2], b[2], 1e-7);
+                }
+            }
+        }
+    }
+}
+
+/// A ball at rest sinks in by its weight over the stiffness.
+#[test]
+fn damping_of_a_contact_leaves_its_stiffness() {
+    for solref in ["0.02 1", "0.02 0.4", "-4000 -30"] {
+        let xml = BALL.replace("-40000 -18", solref);
+        let depth = |backend: &dyn asid::core::Backend, effects: &[&str]| {
+            0.05 - Bench::new(backend, &xml, effects).run(3000, &[vec![]])[0][2]
+        };
+        for backend in engines_for("contact-restitution") {
+            let plain = depth(&*backend, &[]);
+            for (effect, share) in [
+                ("contact-restitution@floor:factor=0.5", 1.0),
+                ("contact-restitution@floor:factor=2", 1.0),
+                ("contact-stiffness@floor:factor=0.5", 2.0),
+                ("contact-stiffness@floor:factor=2", 0.5),
+            ] {
+                let found = depth(&*backend, &[effect]) / plain;
+                near(&format!("{effect}, {solref}"), found, share, 0.02 * share);
+            }
+        }
+    }
+}

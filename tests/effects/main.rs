@@ -10,11 +10,13 @@ mod contacts;
 mod contract;
 mod general;
 mod joints;
+mod limits;
 mod motor_side;
 mod page;
 mod sensors;
 mod servos;
 mod supply;
+mod transmitted;
 
 use asid::core::Scene;
 use asid::core::registry::{BackendEntry, all};

@@ -165,6 +165,22 @@ fn a_spring_in_series_sags_under_the_load() {
     );
 }
 
+/// Symptom: a servo at its force limit threw its elastic joint at the beginning of an episode.
+///
+/// Cause: its spring began wound by what the servo asked for, and not by what it can give.
+#[test]
+fn a_servo_at_its_limit_begins_with_a_spring_that_its_limit_winds() {
+    let (limit, rotor) = (3.0, 0.02);
+    let servo = r#"position kp="1000" kv="5" forcerange="-3 3""#;
+    let xml = machine(r#"axis="0 0 1" armature="0.02""#, servo);
+    on_each(&xml, &["joint-compliance@spin:compliance=0.01"], |bench| {
+        let angle = bench.hold(200, &[1.0])[199][0];
+        let time = 200.0 * DT;
+        let expected = 0.5 * limit / (INERTIA + rotor) * time * time;
+        near(&bench.engine, angle, expected, 0.01 * expected);
+    });
+}
+
 #[test]
 fn rotor_and_load_swing_against_each_other() {
     let (rotor, compliance, torque) = (0.1, 0.05, 1.0);

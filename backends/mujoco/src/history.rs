@@ -1,76 +1,83 @@
 //! An actuator's memory at the start of an episode.
 //!
 //! Before the first row of a log the command was the same as in that row. An actuator with a delay
-//! therefore has a history of that command, and one with a first-order filter has settled on it.
-//! MuJoCo itself starts both at zero.
+//! therefore has a history of that command, as a hook leaves it, and one with a first-order filter
+//! has settled on it. MuJoCo itself starts both at zero.
 
 use mujoco_rs::mujoco_c::mjtDyn;
 use mujoco_rs::wrappers::mj_model::MjModel;
 
-/// An entry of a state row that takes a command.
+use crate::ffi::Sim;
+
+/// A number that takes a command.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Entry of the row.
+    /// Its entry among the activations or the histories.
     entry: usize,
     actuator: usize,
     /// Limits of the command.
     range: Option<[f64; 2]>,
 }
 
-/// Entries of a simulation's state row that remember commands.
+impl Place {
+    fn fill(&self, command: &[f64], memory: &mut [f64]) {
+        let value = command[self.actuator];
+        memory[self.entry] = self
+            .range
+            .map_or(value, |[low, high]| value.clamp(low, high));
+    }
+}
+
+/// What of a simulation remembers commands.
 #[derive(Clone, Debug, Default)]
 pub struct CommandMemory {
-    places: Vec<Place>,
+    activations: Vec<Place>,
+    histories: Vec<Place>,
 }
 
 impl CommandMemory {
-    /// Finds the entries; activations begin at `act` and histories at `history` of a row.
+    /// Finds the entries.
     ///
-    /// An activation set by the first keyframe stays as it is; `fresh` is the row right after a
-    /// reset.
-    pub fn of(model: &MjModel, act: usize, history: usize, fresh: &[f64]) -> Self {
-        let mut places = Vec::new();
+    /// An activation set by the first keyframe stays as it is; `activations` are those right after
+    /// a reset.
+    pub fn of(model: &MjModel, activations: &[f64]) -> Self {
+        let mut found = Self::default();
         for actuator in 0..model.nu() as usize {
             let range = model.actuator_ctrllimited()[actuator]
                 .then(|| model.actuator_ctrlrange()[actuator]);
-            let mut put = |entry: usize| {
-                places.push(Place {
-                    entry,
-                    actuator,
-                    range,
-                });
+            let place = |entry: usize| Place {
+                entry,
+                actuator,
+                range,
             };
             let filter = matches!(
                 model.actuator_dyntype()[actuator],
                 mjtDyn::mjDYN_FILTER | mjtDyn::mjDYN_FILTEREXACT
             );
             if let (true, Ok(at)) = (filter, usize::try_from(model.actuator_actadr()[actuator]))
-                && fresh[act + at] == 0.0
+                && activations[at] == 0.0
             {
-                put(act + at);
+                found.activations.push(place(at));
             }
             // A buffer holds two numbers of its own, then the times of its samples, then the
             // samples.
             if let Ok(at) = usize::try_from(model.actuator_historyadr()[actuator]) {
                 let samples = model.actuator_history()[actuator][0] as usize;
-                (0..samples).for_each(|k| put(history + at + 2 + samples + k));
+                let entries = (0..samples).map(|k| at + 2 + samples + k);
+                found.histories.extend(entries.map(place));
             }
         }
-        Self { places }
+        found
     }
 
-    /// Fills a row as if the command had been held for a long time.
-    pub fn hold(&self, row: &mut [f64], command: &[f64]) {
-        for place in &self.places {
-            let value = command[place.actuator];
-            row[place.entry] = place
-                .range
-                .map_or(value, |[low, high]| value.clamp(low, high));
+    /// Fills them as if the present command had been held for a long time.
+    pub fn hold(&self, sim: &mut Sim<'_>) {
+        let (command, activations, histories) = sim.command_memory();
+        for place in &self.activations {
+            place.fill(command, activations);
         }
-    }
-
-    /// Whether nothing is remembered.
-    pub fn is_empty(&self) -> bool {
-        self.places.is_empty()
+        for place in &self.histories {
+            place.fill(command, histories);
+        }
     }
 }

@@ -6,6 +6,7 @@ use mujoco_rs::mujoco_c::{mjtIntegrator, mjtStage};
 use mujoco_rs::wrappers::mj_model::MjModel;
 
 use crate::ffi::{BadNumber, Sim, is_bad};
+use crate::history::CommandMemory;
 use crate::target::Column;
 
 /// What must be computed before a row can be read.
@@ -56,6 +57,8 @@ pub struct Frames<'a> {
     pub halves: bool,
     /// The batch's columns, which a hook may change.
     pub columns: &'a [Column],
+    /// What actuators remember of commands.
+    pub memory: &'a CommandMemory,
 }
 
 /// Whether the model's integrator allows a step in two halves; Runge-Kutta's stages do not.
@@ -68,6 +71,9 @@ pub fn has_halves(model: &MjModel) -> bool {
 pub struct Job<'a> {
     /// Row of the rollout.
     pub row: usize,
+    /// Whether its episode has begun but taken no step: actuators with a memory then settle on the
+    /// first command.
+    pub begun: bool,
     /// Its readings, `frames x width`.
     pub out: &'a mut [f64],
     /// Frames completed.
@@ -166,6 +172,9 @@ pub fn run(job: &mut Job<'_>, sim: &mut Sim<'_>, frames: &Frames<'_>) {
                         return;
                     }
                 }
+            }
+            if std::mem::take(&mut job.begun) {
+                frames.memory.hold(sim);
             }
             if std::mem::take(&mut half_done) {
                 sim.step2();

@@ -80,9 +80,12 @@ impl MujocoSimulator {
             batch.set_const(&all).map_err(Error::Failed)?;
         }
         batch.reset(&all, !layout.keyframes.is_empty());
+        // An episode begins at time zero, whatever time the keyframe states.
+        for sim in 0..size {
+            batch.state(sim)[states.time.clone()].fill(0.0);
+        }
         let fresh = batch.state(0).to_vec();
-        let (act, history) = (states.act.start, states.history.start);
-        let memory = CommandMemory::of(&compiled.model, act, history, &fresh);
+        let memory = CommandMemory::of(&compiled.model, &fresh[states.act.clone()]);
         let values = std::iter::repeat_with(|| plan.nominal())
             .take(size)
             .flatten()

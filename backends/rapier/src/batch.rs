@@ -38,12 +38,10 @@ impl Batch {
     /// Makes a batch with every simulation reset and with nominal parameters.
     ///
     /// # Errors
-    /// When a target does not belong to the scene, or no threads can be started.
+    /// When a target does not belong to the scene or two set the same thing, or no threads can be
+    /// started.
     pub fn new(compiled: Arc<Compiled>, config: &BatchConfig) -> Result<Self> {
-        let mut columns = Vec::with_capacity(config.targets.len());
-        for target in &config.targets {
-            columns.push((target.clone(), ParameterSlot::resolve(target, &compiled)?));
-        }
+        let columns = ParameterSlot::resolve_all(&config.targets, &compiled)?;
         let threads = config.thread_count();
         let pool = if threads.min(config.size) > 1 {
             Some(pool::of(threads)?)

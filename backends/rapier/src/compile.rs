@@ -60,6 +60,7 @@ fn empty(structure: Structure) -> State {
         ccd: CCDSolver::new(),
         resistance: Resistance::default(),
         structure,
+        fresh: true,
         time: 0.0,
         status: Status::Running,
     }
@@ -94,7 +95,7 @@ impl Compiled {
         })?;
         let (masses, structure) = MassModel::new(&model);
         let geom_frames = document::geom_frames(&model);
-        let sensors = SensorSlot::of_scene(&model, &layout);
+        let sensors = SensorSlot::of_scene(scene, &model, &layout);
         let actuators = document::actuators(&model, &layout)?;
         let nominal = Tables::new(&model, structure.clone());
         let start = match layout.keyframes.first() {

@@ -98,9 +98,10 @@ pub fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
     for (actuator, place) in model.actuators.iter().zip(&layout.actuators) {
         let name = actuator.joint.as_deref().unwrap_or_default();
         layout.joint(name)?;
+        let force_range = asid_mjcf::document::range(actuator.force_range);
         let limited = actuator
             .force_limited
-            .resolve(model.compiler.autolimits, actuator.force_range.is_some());
+            .resolve(model.compiler.autolimits, force_range.is_some());
         // Other laws are refused before.
         let (law, gain) = law(actuator).unwrap_or((DriveLaw::Motor, 1.0));
         slots.push(ActuatorSlot {
@@ -116,7 +117,7 @@ pub fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
                 .position(|j| j.name == name)
                 .unwrap_or_default(),
             ctrl_range: place.ctrl_range,
-            force_range: actuator.force_range.filter(|_| limited),
+            force_range: force_range.filter(|_| limited),
         });
     }
     Ok(slots)

@@ -18,7 +18,8 @@
 //! - Torsional and rolling friction are torques from the normal force of the previous step (module
 //!   `contact`).
 //! - A state is a copy of rapier's collections and continues to the bit. Setting a state starts
-//!   from the world as built, so it has no memory.
+//!   from the world as built, so it has no memory. Contact forces that are read of it are those of
+//!   the step that would follow.
 //!
 //! # Accuracy
 //!
@@ -53,11 +54,11 @@
 //! - The saturation of a servo is judged by the force that it would reach at the end of the step,
 //!   where MuJoCo takes that of the start.
 //! - Not simulated, and refused: actuators with states, `<general>` ones with another law than that
-//!   of a motor, a position or a velocity servo, tendons, flexes,
-//!   meshes, height fields and ellipsoids in contact, fluids, damped free joints, springs and
-//!   limits of ball joints, a `<pair>` whose friction differs by direction. Sensors other than
-//!   positions, orientations and velocities of frames and joints are refused when they are
-//!   requested.
+//!   of a motor, a position or a velocity servo, tendons, flexes, stiffness and damping of higher
+//!   order, meshes, height fields and ellipsoids in contact, fluids, damped free joints, springs
+//!   and limits of ball joints, a `<pair>` whose friction differs by direction. Sensors other than
+//!   positions, orientations and velocities of frames and joints, and sensors with a delay of their
+//!   own, are refused when they are requested.
 //!
 //! # Speed
 //!

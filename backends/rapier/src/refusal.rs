@@ -33,7 +33,7 @@ const ELEMENTS: [&str; 13] = [
 ];
 
 /// Attributes that change the physics and that this backend or its loader lacks.
-const ATTRIBUTES: [(&str, &str); 19] = [
+const ATTRIBUTES: [(&str, &str); 20] = [
     ("position", "dampratio"),
     ("position", "timeconst"),
     ("position", "inheritrange"),
@@ -46,6 +46,7 @@ const ATTRIBUTES: [(&str, &str); 19] = [
     ("joint", "actuatorfrcrange"),
     ("joint", "actuatorgravcomp"),
     ("joint", "springdamper"),
+    ("freejoint", "align"),
     ("geom", "fluidshape"),
     ("geom", "gap"),
     ("geom", "shellinertia"),
@@ -133,13 +134,22 @@ fn check_document(scene: &Scene) -> Result<()> {
         for (element, attribute) in ATTRIBUTES {
             if tag == element
                 && let Some(value) = node.attribute(attribute)
-                && !["0", "false", "none", "-1"].contains(&value)
+                && !["0", "false", "none", "auto", "-1"].contains(&value)
             {
                 return Err(refuse(
                     scene,
                     format!("cannot honour `{attribute}` of {}", place(&node)),
                 ));
             }
+        }
+        if let Some(attribute) = of_higher_order(&node) {
+            return Err(refuse(
+                scene,
+                format!(
+                    "has only the linear coefficient of `{attribute}` of {}",
+                    place(&node)
+                ),
+            ));
         }
         let collides = ["contype", "conaffinity"]
             .iter()
@@ -178,6 +188,16 @@ fn check_document(scene: &Scene) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The attribute of a joint that has coefficients of higher order.
+fn of_higher_order(node: &Node<'_, '_>) -> Option<&'static str> {
+    let higher = |text: &str| {
+        let mut higher = text.split_whitespace().skip(1);
+        higher.any(|x| x.parse::<f64>() != Ok(0.0))
+    };
+    let mut both = ["stiffness", "damping"].into_iter();
+    both.find(|a| node.has_tag_name("joint") && node.attribute(*a).is_some_and(higher))
 }
 
 /// Flags of MuJoCo's solver, which do not affect the physics.

@@ -4,9 +4,11 @@
 //! of mass, and `xbody` is the frame of the body itself.
 
 use asid_core::layout::Layout;
-use asid_core::{Error, Result};
+use asid_core::{Error, Result, Scene};
+use asid_mjcf::memory;
 use mjcf_rs::Model;
 use nalgebra::{UnitQuaternion, Vector3};
+use roxmltree::{Document, Node};
 
 use crate::convert;
 use crate::slot::Frame;
@@ -51,11 +53,19 @@ pub enum SensorSlot {
 
 impl SensorSlot {
     /// The sensors of a parsed scene, in its order.
-    pub fn of_scene(model: &Model, layout: &Layout) -> Vec<Self> {
-        model
-            .sensors
-            .iter()
-            .map(|sensor| Self::of(sensor, model, layout))
+    pub fn of_scene(scene: &Scene, model: &Model, layout: &Layout) -> Vec<Self> {
+        let late = late(scene.xml());
+        // The parser puts sensors of attached documents before those of this one.
+        let attached = model.sensors.len().saturating_sub(late.len());
+        let sensors = model.sensors.iter().enumerate();
+        sensors
+            .map(|(i, sensor)| {
+                if i >= attached && late[i - attached] {
+                    Self::Unread("with a delay or an interval of its own".into())
+                } else {
+                    Self::of(sensor, model, layout)
+                }
+            })
             .collect()
     }
 
@@ -141,6 +151,26 @@ impl SensorSlot {
             _ => Ok(()),
         }
     }
+}
+
+/// Whether each sensor of a document reads an earlier moment: by its `delay`, or between two of its
+/// `interval`.
+fn late(xml: &str) -> Vec<bool> {
+    let Ok(document) = Document::parse(xml) else {
+        return Vec::new();
+    };
+    let root = document.root_element();
+    let pauses = |node: Node<'_, '_>| {
+        let interval = node.attribute("interval").unwrap_or("0");
+        let first = interval.split_whitespace().next().map(str::parse::<f64>);
+        first.is_some_and(|interval| interval != Ok(0.0))
+    };
+    let sections = root.children().filter(|n| n.has_tag_name("sensor"));
+    let sensors = sections.flat_map(|s| s.children());
+    sensors
+        .filter(Node::is_element)
+        .map(|node| memory::delay(root, node) != 0.0 || pauses(node))
+        .collect()
 }
 
 fn missing(kind: &str, name: &str) -> SensorSlot {

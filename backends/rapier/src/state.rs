@@ -38,6 +38,8 @@ pub struct State {
     pub resistance: Resistance,
     /// Mass properties and places that the collections were built with.
     pub structure: Structure,
+    /// Whether it was set and no step was taken since, so that no contact is known yet.
+    pub fresh: bool,
     /// Time since the last reset or load, s.
     pub time: f64,
     /// Whether it runs.

@@ -1,5 +1,6 @@
 //! One simulation: its state, its parameters, and rapier's pipeline that steps it.
 
+mod ahead;
 mod divergence;
 mod forces;
 
@@ -91,6 +92,7 @@ impl World {
     pub fn place(&mut self, compiled: &Compiled, qpos: &[f64], qvel: &[f64], time: f64) {
         self.adopt(compiled, &compiled.pristine);
         self.state.set_coordinates(compiled, qpos, qvel);
+        self.state.fresh = true;
         self.state.time = time;
     }
 
@@ -110,6 +112,7 @@ impl World {
             return;
         }
         let outcome = catch_unwind(AssertUnwindSafe(|| self.try_step(compiled, input)));
+        self.state.fresh = false;
         self.steps += 1;
         let message = match outcome {
             Ok(()) => self
@@ -261,6 +264,10 @@ impl World {
             self.state
                 .coordinates(compiled, &mut self.qpos, &mut self.qvel);
         }
+        let touches = |c: &Channel| matches!(c, Channel::ContactForce { .. });
+        let ahead = (self.state.fresh && record.channels().iter().any(touches))
+            .then(|| self.ahead(compiled));
+        let touching = ahead.as_ref().unwrap_or(&self.state);
         for (i, channel) in record.channels().iter().enumerate() {
             let out = &mut row[record.range(i)];
             match *channel {
@@ -275,8 +282,8 @@ impl World {
                 }
                 Channel::ContactForce { bodies } => {
                     out[0] = contact::normal_force(
-                        &self.state.narrow_phase,
-                        &self.state.colliders,
+                        &touching.narrow_phase,
+                        &touching.colliders,
                         &compiled.body_of_geom,
                         bodies,
                         compiled.layout.timestep,

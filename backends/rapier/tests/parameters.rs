@@ -5,7 +5,7 @@
 mod support;
 
 use asid_core::simulator::ParameterChange;
-use asid_core::{Backend, Control, Error, Rollout, Target};
+use asid_core::{Backend, BatchConfig, Control, Error, Rollout, Target};
 use asid_rapier::Rapier;
 use support::{Bench, scene};
 
@@ -197,6 +197,31 @@ fn targets_that_make_no_sense_are_refused() {
         let error = bench.simulator.set_parameters(&[0], &[value]).unwrap_err();
         assert!(error.to_string().contains("geom/crate/mass"), "{error}");
     }
+}
+
+/// Symptom: a payload weighed nothing. Cause: it changes the masses of a body's geoms, and the mass
+/// of the body, beside them, was put back to its own value.
+#[test]
+fn a_body_has_one_mass() {
+    let model = Rapier.load(&scene(SCENE)).unwrap();
+    let made = |targets: [&str; 2]| {
+        let config = BatchConfig {
+            size: 1,
+            threads: 1,
+            targets: targets.iter().map(|t| t.parse().unwrap()).collect(),
+        };
+        model.simulator(&config).map(|_| ())
+    };
+    let (body, weight) = ("body/crate/mass", "geom/weight/mass");
+    for targets in [[body, weight], [weight, body], [body, "geom/weight/pos/0"]] {
+        let error = made(targets).unwrap_err().to_string();
+        let whole = error.contains(targets[1]) && error.contains(targets[0]);
+        assert!(whole && error.contains("same mass properties"), "{error}");
+    }
+    let error = made(["option/gravity/2"; 2]).unwrap_err().to_string();
+    assert!(error.contains("named twice"), "{error}");
+    // Another body's geoms are no part of it.
+    assert!(made([body, "geom/ball/mass"]).is_ok());
 }
 
 #[test]

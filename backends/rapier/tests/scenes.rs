@@ -104,6 +104,49 @@ fn sensors_read_frames_where_they_are() {
     );
 }
 
+/// Symptom: a sensor that reads late by itself was read at once. Cause: the parser knows no `delay`
+/// and no `interval` of sensors.
+#[test]
+fn a_sensor_that_reads_late_by_itself_is_refused_when_it_is_read() {
+    let inside = r#"<worldbody><body><joint name="j"/><geom type="sphere" size=".1" pos=".3 0 0"/></body></worldbody>
+      <sensor><jointpos name="late" joint="j" delay="0.05" nsample="60"/><jointpos name="now" joint="j" nsample="3"/>
+        <jointpos name="seldom" joint="j" interval="0.01" nsample="3"/></sensor>"#;
+    let mut bench = Bench::new(inside, &["now"]);
+    bench.place(&[0.2], &[0.0]);
+    assert!((bench.read()[0] - 0.2).abs() < 1e-6);
+    for name in ["late", "seldom"] {
+        let record = bench.simulator.layout().recording(&[name]).unwrap();
+        let read = bench.simulator.read(&[0], &record, &mut [0.0]);
+        let error = read.unwrap_err().to_string();
+        assert!(
+            error.contains(&format!("read sensor `{name}`")) && error.contains("delay"),
+            "{error}"
+        );
+    }
+}
+
+/// Symptom: the same machine moved otherwise than in MuJoCo. Cause: the parser left the ends of
+/// geoms where they are, dropped joints in frames, and took positions and rotations together.
+#[test]
+fn frames_and_classes_are_as_if_written_out() {
+    let written_out = r#"<worldbody><body name="rod" pos="0 0 1">
+        <joint name="j" axis="0 1 0" pos="0 .1 0"/>
+        <geom type="capsule" size=".02" fromto="0 .1 0 .3 .1 0" mass="1"/>
+        <geom type="box" size=".1 .02 .03" pos="0 0 -.3" euler="0 .3 0" mass=".5"/></body></worldbody>"#;
+    let by_frames = r#"<default><default class="placed"><geom pos="0 0 -.3" size=".2 .02 .03"/></default></default>
+      <worldbody><frame pos="0 0 1"><body name="rod">
+        <frame pos="0 .1 0" euler="0 0 1.5707963267948966"><joint name="j" axis="1 0 0"/>
+          <geom type="capsule" size=".02" fromto="0 0 0 0 -.3 0" mass="1"/></frame>
+        <geom class="placed" type="box" size=".1" euler="0 .3 0" mass=".5"/></body></frame></worldbody>"#;
+    let ends = [written_out, by_frames].map(|inside| {
+        let mut bench = Bench::new(inside, &["qpos.j"]);
+        bench.place(&[0.1], &[0.0]);
+        bench.run(200, &[]).pop().unwrap()[0]
+    });
+    assert!((ends[0] - 0.1).abs() > 0.1, "{ends:?}");
+    assert!((ends[1] - ends[0]).abs() < 1e-4, "{ends:?}");
+}
+
 #[test]
 fn equalities_hold() {
     let inside = r#"<worldbody>
@@ -133,6 +176,8 @@ fn what_it_cannot_simulate_is_refused_by_name() {
         (format!("<worldbody>{joint}</worldbody><actuator><motor name=\"m\" joint=\"k\"/></actuator>"), "joint `k` of actuator `m`"),
         ("<worldbody><body><freejoint/><geom name=\"e\" type=\"ellipsoid\" size=\"1 2 3\"/></body></worldbody>".into(), "geom `e`"),
         ("<worldbody><body><joint name=\"ball\" type=\"ball\" stiffness=\"1\"/><geom size=\"1\"/></body></worldbody>".into(), "ball joint `ball`"),
+        ("<worldbody><body><joint name=\"s\" stiffness=\"1 0 3\"/><geom size=\"1\"/></body></worldbody>".into(), "linear coefficient of `stiffness` of <joint> `s`"),
+        ("<worldbody><body><freejoint name=\"f\" align=\"true\"/><geom size=\"1\"/></body></worldbody>".into(), "`align` of <freejoint> `f`"),
         ("<worldbody><body name=\"none\"><freejoint/></body></worldbody>".into(), "`none` moves but has no mass"),
         ("<option viscosity=\"0.1\"/><worldbody/>".into(), "`viscosity` of <option>"),
         ("<option><flag gravity=\"disable\"/></option><worldbody/>".into(), "`gravity` of <flag>"),

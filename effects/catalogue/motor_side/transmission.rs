@@ -218,18 +218,31 @@ impl Transmission {
         [rotor[0] + speed * self.dt, speed]
     }
 
-    /// Angle and speed of a rotor in balance with its joint.
-    pub(super) fn settled(&self, law: Law, q: f64, v: f64) -> [f64; 2] {
+    /// Angle and speed of a rotor in balance with its joint, at whose speed it moves.
+    ///
+    /// `gives` is the force of the drive where its law asks for one: less at a limit.
+    pub(super) fn settled(&self, law: Law, gives: impl Fn(f64) -> f64, q: f64, v: f64) -> [f64; 2] {
+        let Between {
+            compliance,
+            half_gap,
+            ..
+        } = self.between;
+        let push = law.a - law.d * v;
         let end = if law.b > 0.0 {
-            (law.a / law.b).clamp(q - self.between.half_gap, q + self.between.half_gap)
-        } else if law.a == 0.0 {
+            (push / law.b).clamp(q - half_gap, q + half_gap)
+        } else if push == 0.0 {
             q
         } else {
-            q + self.between.half_gap.copysign(law.a)
+            q + half_gap.copysign(push)
         };
-        let angle =
-            (end + self.between.compliance * law.a) / (1.0 + self.between.compliance * law.b);
-        [angle, v]
+        let angle = (end + compliance * push) / (1.0 + compliance * law.b);
+        let asked = push - law.b * angle;
+        let given = gives(asked);
+        if given == asked {
+            return [angle, v];
+        }
+        // At its limit the drive winds the spring by what it gives, whatever it asks for.
+        [q + half_gap.copysign(given) + compliance * given, v]
     }
 
     /// State of the rotor after its joint was placed elsewhere; `from` and `to` are position and
@@ -350,5 +363,32 @@ mod tests {
         let begun = transmission.begin(law, [0.4, 0.0], 0.4, 0.0);
         assert!((begun.force - 2.0).abs() < 1e-12);
         assert!((begun.damping - 2.0).abs() < 5e-3);
+    }
+
+    /// In balance the spring transmits what the drive gives, at its limit and at the joint's speed.
+    #[test]
+    fn a_settled_spring_is_wound_by_the_force_of_its_drive() {
+        let between = Between {
+            compliance: 0.01,
+            ..Between::default()
+        };
+        let transmission = rotor(0.1, between);
+        let (q, v) = (0.3, 2.0);
+        for (law, limit) in [
+            // A position servo, free and at its limit.
+            ([30.0, 20.0, 1.0], 100.0),
+            ([3000.0, 2000.0, 1.0], 5.0),
+            // A velocity servo that moves as it is asked to.
+            ([10.0, 0.0, 5.0], 100.0),
+            ([-40.0, 0.0, 5.0], 7.0),
+        ] {
+            let [a, b, d] = law;
+            let law = Law { a, b, d };
+            let gives = |asked: f64| asked.clamp(-limit, limit);
+            let [angle, speed] = transmission.settled(law, gives, q, v);
+            let force = gives(a - b * angle - d * speed);
+            assert!((angle - q - between.compliance * force).abs() < 1e-12);
+            assert_eq!(speed, v);
+        }
     }
 }

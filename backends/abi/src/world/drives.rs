@@ -48,9 +48,10 @@ pub fn actuators(
                 )
             })?,
         };
+        let force_range = asid_mjcf::document::range(actuator.force_range);
         let force_limited = actuator
             .force_limited
-            .resolve(model.compiler.autolimits, actuator.force_range.is_some());
+            .resolve(model.compiler.autolimits, force_range.is_some());
         // A default class for `<general>` may give a servo its gains.
         let [kp, kv] = match law(actuator) {
             Some((DriveLaw::Position { kp, kv }, _)) => [kp, kv],
@@ -73,7 +74,7 @@ pub fn actuators(
             kp: kp * has(&[actuator_kind::POSITION]),
             kv: kv * has(&[actuator_kind::POSITION, actuator_kind::VELOCITY]),
             ctrl_range: place.ctrl_range.unwrap_or_default(),
-            force_range: actuator.force_range.unwrap_or_default(),
+            force_range: force_range.unwrap_or_default(),
         });
     }
     Ok(drives)

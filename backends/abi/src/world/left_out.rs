@@ -227,10 +227,6 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
             let known = known(tag).unwrap_or(&["joint", "gear"]);
             attributes(node, "actuator", known, found);
         }
-        // Within a frame only poses are composed; the parser skips these elements.
-        (_, "joint" | "freejoint" | "inertial") if parent == Some("frame") => {
-            found.push(format!("frame/{tag}"));
-        }
         ("default", "general" | "intvelocity" | "damper") => {
             let known = known("motor").unwrap_or_default();
             attributes(node, &format!("default/{tag}"), known, found);
@@ -259,7 +255,7 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
 fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec<String>) {
     for attribute in node.attributes() {
         let (name, value) = (attribute.name(), attribute.value());
-        let carried = known.contains(&name)
+        let carried = (known.contains(&name) && !is_of_higher_order(name, value))
             || LABELS.contains(&name)
             || POSE.contains(&name)
             || (element == "option" && PRECISION.contains(&name))
@@ -270,6 +266,13 @@ fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec
             found.push(labelled(element, node.attribute("name"), name));
         }
     }
+}
+
+/// Whether a stiffness or damping has more than its linear coefficient, which the structure
+/// carries.
+fn is_of_higher_order(name: &str, value: &str) -> bool {
+    let mut higher = value.split_whitespace().skip(1);
+    ["stiffness", "damping"].contains(&name) && higher.any(|x| x.parse::<f64>() != Ok(0.0))
 }
 
 /// Whether a value is MJCF's default.

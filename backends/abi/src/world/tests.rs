@@ -269,6 +269,40 @@ fn what_the_structure_lacks_is_listed() {
     );
 }
 
+/// Symptom: an engine got other frictions, and no joint from a frame. Cause: the parser reads lists
+/// of a class as a whole, and skips joints and inertias in frames.
+#[test]
+fn frames_and_classes_are_resolved() {
+    let world = read(
+        r#"<default><geom friction="0.8 0.01 0.001"/></default><worldbody><body name="b">
+        <frame pos="0 0 1" euler="0 0 90"><joint axis="1 0 0"/><inertial pos="1 0 0" mass="2" diaginertia="1 1 1"/>
+          <geom size=".1" friction="0.5"/></frame></body></worldbody>"#,
+    );
+    assert_eq!(left_out(&world), Vec::<String>::new());
+    let table = world.table();
+    let joint = list(table.joints, table.njoint)[0];
+    near(joint.pos, [0.0, 0.0, 1.0]);
+    near(joint.axis, [0.0, 1.0, 0.0]);
+    near(list(table.bodies, table.nbody)[1].com, [0.0, 1.0, 1.0]);
+    let geom = list(table.geoms, table.ngeom)[0];
+    near(geom.friction, [0.5, 0.01, 0.001]);
+    near(geom.pos, [0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn coefficients_of_higher_order_are_listed() {
+    let world = read(
+        r#"<default><joint damping="1 2"/></default><worldbody><body>
+        <joint name="j" stiffness="1 0 3" damping="2 0"/><geom size=".1"/></body></worldbody>"#,
+    );
+    assert_eq!(
+        left_out(&world),
+        ["default/joint damping", "joint/j stiffness"]
+    );
+    let joint = list(world.table().joints, 1)[0];
+    assert_eq!((joint.stiffness, joint.damping), (1.0, 2.0));
+}
+
 #[test]
 fn nonsense_is_refused_with_its_name() {
     let body = |inside: &str| format!("<worldbody><body name='b'>{inside}</body></worldbody>");

@@ -92,6 +92,20 @@ impl Sim<'_> {
         unsafe { slice_mut((*self.d).ctrl, (*self.m).nu as usize) }
     }
 
+    /// Commands, and what actuators remember of earlier ones: activations, `na`, and the buffers of
+    /// delays.
+    pub fn command_memory(&mut self) -> (&[f64], &mut [f64], &mut [f64]) {
+        // SAFETY: three disjoint arrays of `d`, borrowed from `self` together.
+        unsafe {
+            let (m, d) = (&*self.m, self.d);
+            (
+                slice((*d).ctrl, m.nu as usize),
+                slice_mut((*d).act, m.na as usize),
+                slice_mut((*d).history, m.nhistory as usize),
+            )
+        }
+    }
+
     /// Applied wrenches, `nbody x 6`: force, then torque.
     pub fn wrenches(&mut self) -> &mut [f64] {
         // SAFETY: `6 nbody` doubles, borrowed from `self`.

@@ -4,7 +4,7 @@
 use std::ffi::c_int;
 use std::ops::Range;
 
-use asid_core::{Control, Error, Result, Rollout, Simulator as _, Status};
+use asid_core::{Error, Result, Rollout, Simulator as _, Status};
 
 use super::{MujocoSimulator, ids};
 use crate::ffi::BadNumber;
@@ -43,17 +43,10 @@ impl MujocoSimulator {
                 mine.fill(f64::NAN);
                 continue;
             }
-            if std::mem::take(&mut self.begun[sim]) && rollout.frames > 0 && !self.memory.is_empty()
-            {
-                let first = match rollout.control {
-                    Control::Shared(all) => &all[..nu],
-                    Control::PerSimulation(all) => &all[row * rollout.frames * nu..][..nu],
-                };
-                self.memory.hold(self.batch.state(sim), first);
-            }
             sims.push(sim);
             jobs.push(Job {
                 row,
+                begun: rollout.frames > 0 && std::mem::take(&mut self.begun[sim]),
                 out: mine,
                 frames: 0,
                 steps: 0,
@@ -75,6 +68,7 @@ impl MujocoSimulator {
                 sensors: &self.sensors,
                 halves: self.halves,
                 columns: self.plan.columns(),
+                memory: &self.memory,
             };
             if rollout.hook.is_some() {
                 let columns = self.plan.len();

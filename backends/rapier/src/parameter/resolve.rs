@@ -33,6 +33,39 @@ impl ParameterSlot {
         Ok(slot)
     }
 
+    /// Resolves the targets of a batch.
+    ///
+    /// # Errors
+    /// As [`ParameterSlot::resolve`], and where two targets set the same thing.
+    pub fn resolve_all(targets: &[Target], compiled: &Compiled) -> Result<Vec<(Target, Self)>> {
+        let mut columns: Vec<(Target, Self)> = Vec::with_capacity(targets.len());
+        for target in targets {
+            let slot = Self::resolve(target, compiled)?;
+            let clash = columns.iter().find(|(_, o)| slot.clashes(*o, compiled));
+            if let Some((other, _)) = clash {
+                let message = if other == target {
+                    "is named twice".to_owned()
+                } else {
+                    format!("sets the same mass properties as `{other}`; use one of them")
+                };
+                return Err(bad(target, message));
+            }
+            columns.push((target.clone(), slot));
+        }
+        Ok(columns)
+    }
+
+    /// Whether two slots set the same thing: the mass of a body is that of its geoms.
+    fn clashes(self, other: Self, compiled: &Compiled) -> bool {
+        match (self, other) {
+            (Self::BodyMass(body), Self::GeomMass(geom) | Self::GeomPosition(geom, _))
+            | (Self::GeomMass(geom) | Self::GeomPosition(geom, _), Self::BodyMass(body)) => {
+                compiled.body_of_geom[geom] == body && compiled.masses.follows_geoms(body)
+            }
+            _ => self == other,
+        }
+    }
+
     /// Number of entries of the attribute.
     fn entries(self) -> usize {
         match self {

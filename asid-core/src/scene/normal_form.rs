@@ -1,0 +1,355 @@
+//! The document as the parser of descriptions reads it rightly.
+//!
+//! The parser takes a list of numbers, and a place, from one element or one class. In MJCF the
+//! later entries of a shorter list come from the class around, and so does the rotation beside a
+//! position. In a `<frame>` the parser leaves ends (`fromto`) where they are and drops joints and
+//! `<inertial>`. It refuses stiffness and damping of higher order. All of that is written out here,
+//! as MuJoCo compiles it. Everything else stays as it is, to the letter. Documents that `<attach>`
+//! brings in are read as they are.
+
+mod rotation;
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use asid_documents::xml::{Fault, parse};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use roxmltree::Node;
+
+use rotation::{ROTATIONS, rotation};
+
+/// The normal form of a document; the document itself where it has that form.
+///
+/// # Errors
+/// When a number is none, or a frame holds what cannot be moved out of it.
+pub(super) fn normal_form<'x>(name: &str, xml: &'x str) -> Result<Cow<'x, str>, Fault> {
+    let document = parse(name, xml)?;
+    let root = document.root_element();
+    let mut writer = Writer {
+        name,
+        root,
+        edits: Vec::new(),
+    };
+    writer.first_orders();
+    writer.actuators();
+    for world in root.children().filter(|n| n.has_tag_name("worldbody")) {
+        writer.parts(world, Around::default())?;
+    }
+    Ok(edited(xml, writer.edits))
+}
+
+/// What is around an element.
+#[derive(Clone, Copy, Default)]
+struct Around<'d> {
+    /// Pose of the frames around it in its body; `None` without frames.
+    frame: Option<Isometry3<f64>>,
+    /// The nearest `childclass`.
+    class: Option<&'d str>,
+}
+
+/// A document whose normal form is written.
+struct Writer<'d> {
+    /// Name of the document.
+    name: &'d str,
+    root: Node<'d, 'd>,
+    /// Ranges of the text and their replacements; an empty range is an insertion.
+    edits: Vec<(Range<usize>, String)>,
+}
+
+impl<'d> Writer<'d> {
+    /// Leaves the linear coefficient of stiffness and damping.
+    fn first_orders(&mut self) {
+        for node in self.root.descendants().filter(|n| n.has_tag_name("joint")) {
+            for attribute in ["stiffness", "damping"] {
+                let all = node.attribute(attribute).and_then(numbers_of);
+                if let Some([first, _, ..]) = all.as_deref() {
+                    self.set_numbers(node, attribute, &[*first]);
+                }
+            }
+        }
+    }
+
+    /// Completes the coefficients of `<general>`, in whose class other actuators are too.
+    fn actuators(&mut self) {
+        let sections = self.root.children().filter(|n| n.has_tag_name("actuator"));
+        let all = sections.flat_map(|s| s.children());
+        for node in all.filter(Node::is_element) {
+            let sources = self.sources(node, "general", None);
+            for attribute in ["gainprm", "biasprm"] {
+                self.list(node, &sources, attribute);
+            }
+        }
+    }
+
+    /// Writes out the elements of a body or of a frame.
+    fn parts(&mut self, node: Node<'d, 'd>, around: Around<'d>) -> Result<(), Fault> {
+        for child in node.children().filter(Node::is_element) {
+            let tag = child.tag_name().name();
+            let class = child.attribute("childclass").or(around.class);
+            match tag {
+                "body" => {
+                    self.place(child, &[child], around)?;
+                    self.inherit(child, "childclass", around);
+                    self.parts(child, Around { frame: None, class })?;
+                }
+                "frame" => {
+                    let outer = around.frame.unwrap_or_else(Isometry3::identity);
+                    let frame = Some(outer * self.pose(child, &[child])?);
+                    self.strip(child);
+                    self.parts(child, Around { frame, class })?;
+                }
+                "inertial" => self.place(child, &[child], around)?,
+                "joint" => self.joint(child, around)?,
+                "geom" | "site" => {
+                    let sources = self.sources(child, tag, around.class);
+                    self.list(child, &sources, "friction");
+                    self.list(child, &sources, "size");
+                    self.place(child, &sources, around)?;
+                    self.inherit(child, "class", around);
+                }
+                "attach" if around.frame.is_some() => {
+                    return Err(self.fault(
+                        child,
+                        "<attach> in a <frame> cannot be read; put it directly into a <body>",
+                    ));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The elements that say something of `node`, what counts first: itself, then those of `tag` in
+    /// its class and in the classes around that.
+    fn sources(&self, node: Node<'d, 'd>, tag: &str, around: Option<&str>) -> Vec<Node<'d, 'd>> {
+        let is_default = |n: &Node<'d, 'd>| n.has_tag_name("default");
+        let sections = || self.root.children().filter(is_default);
+        let named = node.attribute("class").or(around).and_then(|class| {
+            let mut all = sections().flat_map(|s| s.descendants());
+            all.find(|n| is_default(n) && n.attribute("class") == Some(class))
+        });
+        let within = named.into_iter().flat_map(|n| n.ancestors());
+        // Elements directly in a section are of the class of all.
+        let classes = within.filter(is_default).chain(sections().rev());
+        let said = classes.flat_map(|class| class.children().rev());
+        std::iter::once(node)
+            .chain(said.filter(|n| n.has_tag_name(tag)))
+            .collect()
+    }
+
+    /// Completes a list of numbers whose later entries another source states.
+    fn list(&mut self, node: Node<'d, 'd>, sources: &[Node<'d, 'd>], attribute: &str) {
+        let said = sources.iter().filter_map(|n| n.attribute(attribute));
+        let said: Vec<Vec<f64>> = said.filter_map(numbers_of).collect();
+        let longest = said.iter().map(Vec::len).max().unwrap_or(0);
+        if said.first().is_some_and(|first| first.len() < longest) {
+            let entry = |i: usize| said.iter().find_map(|list| list.get(i)).copied();
+            let whole: Vec<f64> = (0..longest).filter_map(entry).collect();
+            self.set_numbers(node, attribute, &whole);
+        }
+    }
+
+    /// Writes out where an element is.
+    fn place(
+        &mut self,
+        node: Node<'d, 'd>,
+        sources: &[Node<'d, 'd>],
+        around: Around<'d>,
+    ) -> Result<(), Fault> {
+        let Some(frame) = around.frame else {
+            self.join(node, sources);
+            return Ok(());
+        };
+        if let Some(text) = said(sources, "fromto") {
+            let [a, b, c, d, e, f]: [f64; 6] = self.numbers(node, "fromto", text)?;
+            let ends = [[a, b, c], [d, e, f]].map(|end| frame * Point3::from(end));
+            let ends: [[f64; 3]; 2] = ends.map(|end| end.coords.into());
+            self.set_numbers(node, "fromto", &ends.concat());
+            return Ok(());
+        }
+        let pose = frame * self.pose(node, sources)?;
+        let q = pose.rotation;
+        self.set_numbers(node, "pos", pose.translation.vector.as_slice());
+        self.set_numbers(node, "quat", &[q.w, q.i, q.j, q.k]);
+        for other in &ROTATIONS[1..] {
+            if let Some(own) = node.attribute_node(*other) {
+                self.edits.push((own.range(), String::new()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes position and rotation into an element that has them from two sources.
+    fn join(&mut self, node: Node<'d, 'd>, sources: &[Node<'d, 'd>]) {
+        let first = |names: &[&str]| {
+            let has = |n: &Node<'d, 'd>| names.iter().any(|name| n.has_attribute(*name));
+            sources.iter().position(has)
+        };
+        let (Some(position), Some(rotation)) = (first(&["pos"]), first(&ROTATIONS)) else {
+            return;
+        };
+        if position == rotation {
+            return;
+        }
+        for (source, names) in [(position, &["pos"][..]), (rotation, &ROTATIONS[..])] {
+            for name in names.iter().filter(|_| source > 0) {
+                if let Some(value) = sources[source].attribute(*name) {
+                    self.set(node, name, value);
+                }
+            }
+        }
+    }
+
+    /// Moves the anchor and the axis of a joint out of its frames.
+    fn joint(&mut self, node: Node<'d, 'd>, around: Around<'d>) -> Result<(), Fault> {
+        let Some(frame) = around.frame else {
+            return Ok(());
+        };
+        self.inherit(node, "class", around);
+        let sources = self.sources(node, "joint", around.class);
+        if said(&sources, "type") == Some("free") {
+            return Ok(());
+        }
+        let vector = |attribute: &str, otherwise: [f64; 3]| match said(&sources, attribute) {
+            Some(text) => self.numbers(node, attribute, text),
+            None => Ok(otherwise),
+        };
+        let anchor = frame * Point3::from(vector("pos", [0.0; 3])?);
+        let axis = frame * Vector3::from(vector("axis", [0.0, 0.0, 1.0])?);
+        self.set_numbers(node, "pos", anchor.coords.as_slice());
+        self.set_numbers(node, "axis", axis.as_slice());
+        Ok(())
+    }
+
+    /// Gives an element in a frame the class that the frames pass on to it.
+    fn inherit(&mut self, node: Node<'d, 'd>, attribute: &str, around: Around<'d>) {
+        if let (Some(_), Some(class), false) =
+            (around.frame, around.class, node.has_attribute(attribute))
+        {
+            self.set(node, attribute, class);
+        }
+    }
+
+    /// Pose that an element and its classes state.
+    fn pose(&self, node: Node<'d, 'd>, sources: &[Node<'d, 'd>]) -> Result<Isometry3<f64>, Fault> {
+        let [x, y, z]: [f64; 3] = match said(sources, "pos") {
+            Some(text) => self.numbers(node, "pos", text)?,
+            None => [0.0; 3],
+        };
+        let stated = |n: &Node<'d, 'd>| ROTATIONS.iter().find_map(|a| Some((*a, n.attribute(*a)?)));
+        let turn = match sources.iter().find_map(stated) {
+            Some((attribute, text)) => self.rotation(node, attribute, text)?,
+            None => UnitQuaternion::identity(),
+        };
+        Ok(Isometry3::from_parts(Translation3::new(x, y, z), turn))
+    }
+
+    /// The rotation that an attribute states.
+    fn rotation(
+        &self,
+        node: Node<'d, 'd>,
+        attribute: &str,
+        text: &str,
+    ) -> Result<UnitQuaternion<f64>, Fault> {
+        let unit = match self.compiler("angle") {
+            Some("radian") => 1.0,
+            _ => std::f64::consts::PI / 180.0,
+        };
+        let order = self.compiler("eulerseq").unwrap_or("xyz");
+        let numbers = numbers_of(text).unwrap_or_default();
+        let turn = rotation(attribute, &numbers, unit, order);
+        turn.ok_or_else(|| self.fault(node, &format!("{attribute}=\"{text}\" is no rotation")))
+    }
+
+    /// A setting of the compiler: the last one in the document.
+    fn compiler(&self, attribute: &str) -> Option<&'d str> {
+        let sections = self.root.children().filter(|n| n.has_tag_name("compiler"));
+        sections.rev().find_map(|n| n.attribute(attribute))
+    }
+
+    /// The numbers of an attribute.
+    fn numbers<const N: usize>(
+        &self,
+        node: Node<'d, 'd>,
+        attribute: &str,
+        text: &str,
+    ) -> Result<[f64; N], Fault> {
+        let numbers = numbers_of(text).unwrap_or_default();
+        let found = <[f64; N]>::try_from(numbers);
+        found.map_err(|_| self.fault(node, &format!("{attribute}=\"{text}\" is not {N} numbers")))
+    }
+
+    fn fault(&self, node: Node<'d, 'd>, what: &str) -> Fault {
+        let line = node.document().text_pos_at(node.range().start).row;
+        Fault::new(self.name, format!("line {line}: {what}"))
+    }
+
+    fn set_numbers(&mut self, node: Node<'d, 'd>, attribute: &str, values: &[f64]) {
+        let texts: Vec<String> = values.iter().map(|x| format!("{x}")).collect();
+        self.set(node, attribute, &texts.join(" "));
+    }
+
+    /// Gives an element an attribute.
+    fn set(&mut self, node: Node<'d, 'd>, attribute: &str, value: &str) {
+        let value = value.replace('&', "&amp;").replace('<', "&lt;");
+        let value = value.replace('"', "&quot;");
+        self.edits.push(match node.attribute_node(attribute) {
+            Some(own) => (own.range_value(), value),
+            None => {
+                let at = after_name(node);
+                (at..at, format!(" {attribute}=\"{value}\""))
+            }
+        });
+    }
+
+    /// Removes the tags around the content of an element.
+    fn strip(&mut self, node: Node<'d, 'd>) {
+        let (text, whole) = (node.document().input_text(), node.range());
+        let attributes = node.attributes().map(|a| a.range().end);
+        let from = attributes.max().unwrap_or_else(|| after_name(node));
+        let open = text[from..whole.end].find('>');
+        let open = open.map_or(whole.end, |i| from + i + 1);
+        self.edits.push((whole.start..open, String::new()));
+        if let Some(close) = text[open..whole.end].rfind("</") {
+            self.edits.push((open + close..whole.end, String::new()));
+        }
+    }
+}
+
+/// Place in the text after the name in the tag of an element.
+fn after_name(node: Node<'_, '_>) -> usize {
+    let start = node.range().start;
+    let tag = &node.document().input_text()[start..];
+    let end = tag.find(|c: char| c.is_whitespace() || c == '/' || c == '>');
+    start + end.unwrap_or(tag.len())
+}
+
+/// What the first source that has an attribute says.
+fn said<'d>(sources: &[Node<'d, 'd>], attribute: &str) -> Option<&'d str> {
+    sources.iter().find_map(|n| n.attribute(attribute))
+}
+
+/// The numbers of a text; `None` where one is none.
+fn numbers_of(text: &str) -> Option<Vec<f64>> {
+    text.split_whitespace().map(|x| x.parse().ok()).collect()
+}
+
+/// A text with some ranges replaced.
+fn edited(text: &str, mut edits: Vec<(Range<usize>, String)>) -> Cow<'_, str> {
+    if edits.is_empty() {
+        return Cow::Borrowed(text);
+    }
+    edits.sort_by_key(|(range, _)| (range.start, range.end));
+    let mut out = String::with_capacity(text.len());
+    let mut copied = 0;
+    for (range, with) in edits {
+        out.push_str(&text[copied..range.start]);
+        out.push_str(&with);
+        copied = range.end;
+    }
+    out.push_str(&text[copied..]);
+    Cow::Owned(out)
+}
+
+#[cfg(test)]
+mod tests;
