@@ -104,7 +104,8 @@ pub struct CellParameter {
     /// Central 95 % interval of the posterior.
     #[serde(with = "number::pair")]
     pub interval95: [f64; 2],
-    /// Expected posterior standard deviation after the episode; `None` without exploration.
+    /// Expected posterior standard deviation after the episode; `None` without exploration, and
+    /// without the fits that it takes.
     #[serde(with = "number::option")]
     pub expected_std: Option<f64>,
 }

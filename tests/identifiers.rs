@@ -164,7 +164,7 @@ fn a_search_begins_anew_where_its_fit_misses_the_readings_and_not_where_it_expla
         settings.insert("tracker".into(), toml::Value::Table(none));
         settings.insert("restarts".into(), restarts.into());
         let (found, _) = identified_late(("reps", settings), 4.0, 1.1, 2, latency);
-        (found.residual, found.iterations.len())
+        (found.misfit.unwrap(), found.iterations.len())
     };
     let (once, twice) = (rounds(0, 0.03), rounds(1, 0.03));
     assert!(once.0 > 1.5 && twice.0 <= once.0, "{once:?} {twice:?}");

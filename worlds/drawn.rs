@@ -1,6 +1,6 @@
 //! The perturbation that is drawn for one perturbed world.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use asid_core::rng::Rng;
 use asid_core::{Layout, Result, Streams};
@@ -37,6 +37,9 @@ pub struct TrackerPerturbation {
     /// Constant error of each signal: numbers and vectors in their unit, a rotation vector (rad)
     /// for an orientation.
     pub offset: BTreeMap<String, Vec<f64>>,
+    /// Names of the signals whose error is in radians.
+    #[serde(skip)]
+    angles: BTreeSet<String>,
     /// Frames from one reading to the next.
     pub every: usize,
     /// Share of readings that are lost.
@@ -68,6 +71,11 @@ fn direction(length: f64, rng: &mut Rng) -> [f64; 3] {
     let (sin, cos) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();
     let r = (1.0 - z * z).sqrt();
     [r * cos, r * sin, z].map(|x| length * x)
+}
+
+/// Whether the constant error of a signal of this kind and length is a rotation.
+fn is_angle(kind: &str, len: usize) -> bool {
+    len == 4 || kind == "jointpos"
 }
 
 /// Draws the constant error of a signal of this kind and length.
@@ -107,10 +115,14 @@ impl Perturbation {
                 (name, drawn)
             })
             .collect();
+        let mut angles = BTreeSet::new();
         let offsets = tracked
             .iter()
             .map(|name| {
                 let sensor = layout.sensor(name)?;
+                if is_angle(&sensor.kind, sensor.len) {
+                    angles.insert(name.clone());
+                }
                 let mut rng = of(&format!("offset of {name}"));
                 let drawn = offset(&sensor.kind, sensor.len, ranges, &mut rng);
                 Ok((name.clone(), drawn))
@@ -126,6 +138,7 @@ impl Perturbation {
             tracker: TrackerPerturbation {
                 latency: uniform(ranges.tracker_latency, &mut of("tracker latency")),
                 offset: offsets,
+                angles,
                 every: of("tracker rate").random_range(low..=high),
                 dropout: uniform(ranges.tracker_dropout, &mut of("tracker dropout")),
             },
@@ -136,9 +149,9 @@ impl Perturbation {
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let ms = |s: f64| format!("{:.1} ms", 1e3 * s);
-        let largest = |len: usize| {
+        let largest = |angle: bool| {
             let offsets = self.tracker.offset.iter();
-            let chosen = offsets.filter(|(name, _)| name.ends_with("_quat") == (len == 4));
+            let chosen = offsets.filter(|(name, _)| self.tracker.angles.contains(*name) == angle);
             chosen
                 .map(|(_, v)| v.iter().map(|x| x * x).sum::<f64>().sqrt())
                 .fold(0.0, f64::max)
@@ -156,10 +169,54 @@ impl Perturbation {
         words.push(format!(
             "tracker late by {}, off by up to {:.1} mm and {:.1} mrad, {:.1} % of readings lost",
             ms(self.tracker.latency),
-            1e3 * largest(3),
-            1e3 * largest(4),
+            1e3 * largest(false),
+            1e3 * largest(true),
             100.0 * self.tracker.dropout
         ));
         words
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Scene;
+
+    const DOOR: &str = r#"<mujoco>
+  <worldbody>
+    <body name="door">
+      <joint name="hinge"/>
+      <geom name="leaf" type="box" size="0.4 0.02 0.8"/>
+    </body>
+  </worldbody>
+  <sensor>
+    <framepos name="handle" objtype="body" objname="door"/>
+    <framequat name="leaning" objtype="body" objname="door"/>
+    <jointpos name="angle" joint="hinge"/>
+  </sensor>
+</mujoco>"#;
+
+    /// Symptom: a report said that the angle of a hinge was off by 10 mm. Cause: orientations were
+    /// told by names that end in `_quat`, and anything else counted as metres.
+    #[test]
+    fn an_angle_is_off_by_milliradians_whatever_its_sensor_is_called() {
+        let plant = Plant::of(&Scene::from_xml("door", DOOR, &[]).unwrap()).unwrap();
+        let ranges = PerturbationRanges {
+            tracker_offset: [0.002; 2],
+            tracker_rotation: [0.01; 2],
+            ..PerturbationRanges::off()
+        };
+        for (sensor, expected) in [
+            ("angle", "off by up to 0.0 mm and 10.0 mrad"),
+            ("leaning", "off by up to 0.0 mm and 10.0 mrad"),
+            ("handle", "off by up to 2.0 mm and 0.0 mrad"),
+        ] {
+            let tracked = [sensor.to_owned()];
+            let streams = Streams::new(0);
+            let drawn =
+                Perturbation::draw(&ranges, &plant, &plant.layout, &tracked, streams).unwrap();
+            let words = drawn.words().join("; ");
+            assert!(words.contains(expected), "{sensor}: {words}");
+        }
     }
 }

@@ -43,6 +43,9 @@ pub struct Emulator {
     pub residual: f64,
     /// Root mean square of the roughness, in units of the sensors' noise.
     pub roughness: f64,
+    /// Root mean square of the emulated residual at its best point, in units of noise and roughness
+    /// together. Near 1 where the simulator explains the log, however rough it is.
+    pub misfit: f64,
 }
 
 /// Number of features of `n` entries.
@@ -124,6 +127,7 @@ impl Emulator {
             temperature: 1.0,
             residual: 0.0,
             roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
+            misfit: 0.0,
         };
         let best = emulator.minimum(n);
         let best_features = DVector::from_vec(features(&best));
@@ -132,6 +136,7 @@ impl Emulator {
         let raw = at_best.norm_squared() / readings.max(1) as f64;
         emulator.residual = raw.sqrt();
         let mismatch = 2.0 * emulator.loss_at(&best) / (readings as f64 - n as f64).max(1.0);
+        emulator.misfit = mismatch.sqrt();
         // Slopes of the residuals at the best point, for the ratio of the two covariances.
         let b = DMatrix::from_fn(m, n, {
             let slopes: Vec<DVector<f64>> = (0..n)

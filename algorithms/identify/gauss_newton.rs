@@ -174,6 +174,7 @@ impl GaussNewtonIdentifier {
                 .collect(),
             iterations,
             residual: fit.residual,
+            misfit: Some(fit.misfit),
             roughness: fit.roughness,
         };
         Ok(Some((identified, evidence)))
@@ -275,6 +276,7 @@ mod tests {
             free: point.to_vec(),
             information: DMatrix::from_row_slice(n, n, information),
             residual: 1.0,
+            misfit: 1.0,
             roughness: 0.0,
             course: Vec::new(),
         };

@@ -141,6 +141,7 @@ mod tests {
             starts: vec![vec![value]],
             iterations: Vec::new(),
             residual: 1.0,
+            misfit: Some(1.0),
             roughness: 0.0,
         };
         (identified, Evidence { loss, narrowing })

@@ -266,6 +266,7 @@ pub fn posterior(
         starts: (0..episodes).map(|k| likelihood.start(&best, k)).collect(),
         iterations,
         residual: emulator.residual,
+        misfit: Some(emulator.misfit),
         roughness: emulator.roughness,
     };
     Ok((identified, evidence))

@@ -266,6 +266,7 @@ impl Identifier for Estimator {
             starts,
             iterations: Vec::new(),
             residual,
+            misfit: None,
             roughness: 0.0,
         })
     }

@@ -139,6 +139,8 @@ pub struct Fit {
     pub information: DMatrix<f64>,
     /// Root mean square of the residuals at the point, by the linear model.
     pub residual: f64,
+    /// Root mean square of the residuals at the point, in units of noise and roughness together.
+    pub misfit: f64,
     /// Root mean square of the roughness, in units of the readings' noise.
     pub roughness: f64,
     /// For each iteration: half the smallest sum of squares so far, and the points evaluated.
@@ -271,8 +273,8 @@ fn settle(
         let row = DMatrix::from_row_slice(1, left.len(), left.as_slice());
         let weighted = told.precision.weigh(&row).component_mul(&row).sum();
         let spare = (space.readings as f64 - n as f64).max(1.0);
-        let mismatch = (weighted / spare).max(1.0);
-        let information = told.information / mismatch;
+        let mismatch = weighted / spare;
+        let information = told.information / mismatch.max(1.0);
         point.clone_from(&next);
         let covariance = inverse_above_prior(&(&information + DMatrix::identity(n, n)));
         found = Some(Fit {
@@ -280,6 +282,7 @@ fn settle(
             free: whole,
             information,
             residual: (left.norm_squared() / space.readings.max(1) as f64).sqrt(),
+            misfit: mismatch.max(0.0).sqrt(),
             roughness: fit.roughness(space.readings),
             course: Vec::new(),
         });

@@ -184,13 +184,11 @@ fn a_minimum_outside_is_met_at_the_edge() {
     assert!((fit.free[0] - 1.5).abs() < 0.05, "{:?}", fit.free);
 }
 
-#[test]
-fn luck_widens_what_is_said_to_what_it_spreads() {
-    // One unknown of slope 1 in 120 readings, noise 1, and independent roughness of 2 in every
-    // evaluation and in the observation: standard deviation sqrt(5 / 120) = 0.2.
+/// Fits of one unknown of slope 1 in 120 readings, noise 1, and independent roughness of 2 in every
+/// evaluation and in the observation.
+fn of_luck(runs: u64) -> Vec<Fit> {
     let (low, high) = ([-1.7], [1.7]);
-    let runs = 60;
-    let fits: Vec<Fit> = (0..runs)
+    (0..runs)
         .map(|seed| {
             let mut rng = Streams::new(seed).stream("luck");
             let mut luck = move || -> f64 {
@@ -205,7 +203,14 @@ fn luck_widens_what_is_said_to_what_it_spreads() {
                 |x| observed.iter().map(|o| x[0] + luck() - o).collect(),
             )
         })
-        .collect();
+        .collect()
+}
+
+#[test]
+fn luck_widens_what_is_said_to_what_it_spreads() {
+    let runs = 60;
+    let fits = of_luck(runs);
+    // Standard deviation sqrt(5 / 120) = 0.2.
     let wanted = (5.0_f64 / 120.0).sqrt();
     let spread = (fits.iter().map(|f| f.point[0].powi(2)).sum::<f64>() / runs as f64).sqrt();
     let said = fits
@@ -215,4 +220,17 @@ fn luck_widens_what_is_said_to_what_it_spreads() {
         / runs as f64;
     assert!((spread / wanted - 1.0).abs() < 0.4, "{spread} {wanted}");
     assert!((said / wanted - 1.0).abs() < 0.4, "{said} {wanted}");
+}
+
+/// Symptom: a right fit of a rough simulator was said not to explain the readings. Cause: its
+/// residual was compared with their noise alone.
+#[test]
+fn luck_is_in_the_residual_and_is_no_misfit() {
+    let fits = of_luck(20);
+    let mean = |of: fn(&Fit) -> f64| fits.iter().map(of).sum::<f64>() / fits.len() as f64;
+    // Noise 1 and roughness 2: sqrt(1 + 4).
+    let residual = mean(|f| f.residual);
+    assert!((residual / 5.0_f64.sqrt() - 1.0).abs() < 0.15, "{residual}");
+    let misfit = mean(|f| f.misfit);
+    assert!((misfit - 1.0).abs() < 0.15, "{misfit}");
 }

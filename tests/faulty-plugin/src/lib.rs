@@ -220,6 +220,7 @@ impl Identifier for FaultyIdentifier {
             starts: vec![vec![0.0; coordinates]; episodes.len()],
             iterations: Vec::new(),
             residual: 1.0,
+            misfit: Some(1.0),
             roughness: 0.0,
         };
         (self.0)(&mut found);
