@@ -1,10 +1,9 @@
-//! Initial state of a machine without a keyframe: coordinates of an initial state that no sensor
-//! reads are taken from it.
+//! Home of a machine: coordinates of an initial state that no sensor reads are taken from it.
 //!
-//! The default state of a model is where its document places its bodies. A vehicle whose wheels
-//! just touch the ground falls by a millimetre from there, and its accelerometer reads free fall.
-//! The machine has stood still before its log. So it begins where the model comes to rest under the
-//! first command, if replays of the logs' first rows from there leave less.
+//! It is the first keyframe of the model, or where its document places its bodies. A vehicle whose
+//! wheels just touch the ground falls by a millimetre from there, and its accelerometer reads free
+//! fall. The machine has stood still before its log. So it begins where the model comes to rest
+//! under the first command, if replays of the logs' first rows from there leave less.
 
 use asid_core::layout::{Keyframe, Layout};
 use asid_core::{BatchConfig, Control, Model, Recording, Result, Rollout, Simulator};

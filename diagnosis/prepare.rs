@@ -35,8 +35,8 @@ fn reads(episode: &Episode, sensor: &str) -> bool {
 
 /// Returns the sensors that are compared, in the scene's order.
 ///
-/// They have readings in at least one log, and a known noise: a log to fit to shows it, or the study
-/// gives it.
+/// They have readings in at least one log, and a known noise: a log to fit to shows it, or the
+/// study gives it.
 fn compared_sensors(layout: &Layout, study: &Study) -> Vec<String> {
     let is_compared = |name: &str| {
         let any = |logs: &[(String, Episode)]| logs.iter().any(|(_, e)| reads(e, name));

@@ -197,8 +197,8 @@ mod tests {
     /// Symptom: the gap of a right pendulum on a ball joint was enormous in logs that begin at 60
     /// degrees and do not give the initial state.
     ///
-    /// Cause: its sensor counted as reading no joint, so that it began where the document places it,
-    /// at rest. A replay from there does not move, and the prior of the start had no width.
+    /// Cause: its sensor counted as reading no joint, so that it began where the document places
+    /// it, at rest. A replay from there does not move, and the prior of the start had no width.
     #[test]
     fn a_ball_joint_begins_where_its_sensors_read_it() {
         let plant = Plant::of(&Scene::from_xml("pendulum", PENDULUM, &[]).unwrap()).unwrap();

@@ -220,10 +220,6 @@ pub trait Effect: Send + Sync {
     fn steps(&self) -> bool {
         matches!(self.acts(), Acts::Command | Acts::Force)
     }
-    /// Whether it relies on joints whose damping is integrated implicitly, however strong it is.
-    fn needs_implicit_damping(&self) -> bool {
-        false
-    }
     /// Whether it takes the drive of its site, a joint, away from the joint.
     ///
     /// It then comes last, since others depend on the drive.

@@ -11,7 +11,7 @@ mod simulator;
 
 use std::sync::Arc;
 
-use crate::{Acts, Effect, EffectParameter, EffectSpec};
+use crate::{Acts, Effect, EffectSpec};
 use asid_core::backend::{Backend, Capabilities, Model};
 use asid_core::error::{Error, Result};
 use asid_core::layout::Layout;
@@ -111,15 +111,6 @@ impl Refined {
                     what: format!("give a scene the effect `{label}`: it needs {lacking:?}"),
                 });
             }
-            if effect.needs_implicit_damping() && !model.damps_implicitly() {
-                return Err(Error::Incapable {
-                    backend: backend.name().to_owned(),
-                    what: format!(
-                        "give a scene the effect `{label}` with an integrator that damps joints explicitly, which is \
-                         unstable; write integrator=\"implicitfast\" in <option>"
-                    ),
-                });
-            }
             let targets = effect.targets(&plant, &spec.site);
             for target in &targets {
                 model.nominal(target)?;
@@ -205,9 +196,9 @@ pub fn needs(effect: &dyn Effect) -> Capabilities {
 /// and limits of the force are the last of them. One that takes the drive from its joint comes after
 /// all that depend on the drive.
 pub(crate) fn rank(effect: &dyn Effect) -> u8 {
-    let limits = effect.parameters().iter().any(EffectParameter::is_limit);
+    let nulls: Vec<f64> = effect.parameters().iter().map(|p| p.null).collect();
     match effect.acts() {
-        Acts::Command if limits => 1,
+        Acts::Command if effect.force_limit(&nulls).is_some() => 1,
         Acts::Command => 0,
         _ if effect.takes_drive() => 3,
         _ => 2,
@@ -225,10 +216,6 @@ impl Model for Refined {
 
     fn remembers_commands(&self) -> bool {
         self.inner.remembers_commands()
-    }
-
-    fn damps_implicitly(&self) -> bool {
-        self.inner.damps_implicitly()
     }
 
     fn nominal(&self, target: &Target) -> Result<f64> {

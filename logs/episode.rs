@@ -27,7 +27,7 @@ pub use self::parquet::ParquetFile;
 pub(crate) use self::parquet::number_in;
 pub use clock::seconds;
 pub use mapping::{ColumnMapping, counts, unit_counts, unit_factor};
-pub use notes::{LogNotes, some_log_has_columns};
+pub use notes::{LogNotes, check_mapped_columns};
 pub use reader::is_of_start;
 pub use remapped::remapped;
 pub use table::{Table, of_table, quantities, wanted};

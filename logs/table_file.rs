@@ -163,8 +163,8 @@ mod tests {
         assert_eq!(log.series.len(), 2);
     }
 
-    /// Symptom: a table with a row of units below its header had no column at all ("nothing is left in
-    /// the log").
+    /// Symptom: a table with a row of units below its header had no column at all ("nothing is left
+    /// in the log").
     ///
     /// Cause: stamps were counted from the first cell, which was no number, so that none was.
     #[test]

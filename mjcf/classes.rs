@@ -28,7 +28,7 @@ pub fn said<T>(
     });
     let around = named.into_iter().flat_map(|n| n.ancestors());
     let around = around.filter(|n| n.has_tag_name("default"));
-    // Elements directly in a section are of the class of all.
-    let mut classes = around.chain(sections.iter().copied());
+    // Elements directly in a section are of the class of all; the last section that says it counts.
+    let mut classes = around.chain(sections.iter().rev().copied());
     classes.find_map(|class| class.children().rev().find_map(&of))
 }

@@ -119,6 +119,13 @@ pub fn range(stated: Option<[f64; 2]>) -> Option<[f64; 2]> {
     stated.filter(|[low, high]| low < high)
 }
 
+/// Whether a stiffness or damping has more coefficients than the linear one.
+#[must_use]
+pub fn is_of_higher_order(text: &str) -> bool {
+    let mut higher = text.split_whitespace().skip(1);
+    higher.any(|x| x.parse::<f64>() != Ok(0.0))
+}
+
 /// Kind of a joint of the document.
 #[must_use]
 pub fn joint_kind(kind: JointType) -> JointKind {

@@ -39,7 +39,7 @@ pub struct PlantJoint {
     pub body: usize,
     /// Anchor in the body's frame, m.
     pub anchor: [f64; 3],
-    /// Axis in the body's frame.
+    /// Axis in the body's frame, of length one.
     pub axis: [f64; 3],
     /// Coordinate at which the body has its declared pose.
     pub reference: f64,

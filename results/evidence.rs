@@ -31,7 +31,8 @@ impl Default for Replayed {
 pub struct Tried {
     /// Effects at their sites, sorted.
     pub effects: Vec<String>,
-    /// How many named things it is: a group counts once, a law found at one site after the other once for each.
+    /// How many named things it is. A group counts once; a law that was found at one site after the
+    /// other counts once for each.
     pub names: usize,
     /// Evidence over the model without effects, with the prior odds of its names, natural logarithm.
     #[serde(deserialize_with = "nullable::scalar")]

@@ -40,6 +40,8 @@ pub struct Identified {
     pub values: Vec<f64>,
     /// Root mean square of the residuals there, in units of the noise.
     pub residual: f64,
+    /// Root mean square of the residuals there, in units of noise and roughness together.
+    pub misfit: f64,
     /// Information about the parameters from the logs alone, in prior standard deviations.
     pub information: DMatrix<f64>,
     /// Physics steps of all replays.
@@ -159,6 +161,7 @@ pub fn fit(
         posterior: posterior_of(&found, parameters, DRAWS, &mut rng),
         values: values(parameters, &found.point),
         residual: found.residual,
+        misfit: found.misfit,
         information: found.about(parameters.len()),
         physics_steps: replayer.steps(),
     })

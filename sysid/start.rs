@@ -104,11 +104,22 @@ fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
         let at = |k: usize| &episode.reading(k)[range.clone()];
         let seconds = (episode.time[last] - episode.time[first]).max(f64::MIN_POSITIVE);
         let rate = |k: usize| (at(last)[k] - at(first)[k]) / seconds;
+        // Sets an orientation and its spin, which is about the body's own axes.
+        let mut orient = |at_qpos: usize, at_qvel: usize| {
+            state.qpos[at_qpos..at_qpos + 4].copy_from_slice(at(first));
+            // A single reading tells no spin, and its turn by itself is but rounding.
+            if last > first {
+                let turn = Vector3::from(rotation_difference(at(last), at(first)));
+                let own = unit_quaternion(at(first)).inverse() * turn / seconds;
+                state.qvel[at_qvel..at_qvel + 3].copy_from_slice(own.as_slice());
+            }
+        };
         match (plant.sensors[i], &*sensor.kind) {
             (Reads::Joint(j), "jointpos") => {
                 state.qpos[layout.joints[j].qpos] = at(first)[0];
                 state.qvel[layout.joints[j].qvel] = rate(0);
             }
+            (Reads::Joint(j), "ballquat") => orient(layout.joints[j].qpos, layout.joints[j].qvel),
             (Reads::Body(b), kind @ ("framepos" | "framequat")) => {
                 let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
                     continue;
@@ -117,14 +128,7 @@ fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
                     state.qpos[joint.qpos..joint.qpos + 3].copy_from_slice(at(first));
                     (0..3).for_each(|k| state.qvel[joint.qvel + k] = rate(k));
                 } else {
-                    state.qpos[joint.qpos + 3..joint.qpos + 7].copy_from_slice(at(first));
-                    // A single reading tells no spin, and its turn by itself is but rounding.
-                    if last > first {
-                        let turn = Vector3::from(rotation_difference(at(last), at(first)));
-                        // Spins are about the body's own axes.
-                        let own = unit_quaternion(at(first)).inverse() * turn / seconds;
-                        state.qvel[joint.qvel + 3..joint.qvel + 6].copy_from_slice(own.as_slice());
-                    }
+                    orient(joint.qpos + 3, joint.qvel + 3);
                 }
             }
             _ => {}
@@ -132,13 +136,14 @@ fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
     }
     // A measured speed is better than a difference.
     for (i, sensor) in layout.sensors.iter().enumerate() {
-        if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
+        if let (Reads::Joint(j), "jointvel" | "ballangvel") = (plant.sensors[i], &*sensor.kind)
             && let Some(range) = episode.channel(&sensor.name)
             && let Some(speed) = (0..episode.rows())
-                .map(|k| episode.reading(k)[range.start])
-                .find(|x| x.is_finite())
+                .map(|k| &episode.reading(k)[range.clone()])
+                .find(|speed| speed.iter().all(|x| x.is_finite()))
         {
-            state.qvel[layout.joints[j].qvel] = speed;
+            let place = layout.joints[j].qvel;
+            state.qvel[place..place + speed.len()].copy_from_slice(speed);
         }
     }
 }
@@ -184,10 +189,14 @@ mod tests {
     /// Spin of the logged body about the world's vertical axis, rad/s.
     const SPIN: f64 = 8.0;
 
-    /// The start that a log of a tumbling body without an initial state gives, at 100 Hz.
-    fn start_of_turning(rows: usize) -> (InitialState, UnitQuaternion<f64>) {
-        let xml = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="0.1"/></body></worldbody>
-            <sensor><framequat name="q" objtype="xbody" objname="b"/></sensor></mujoco>"#;
+    const FREE: &str = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="0.1"/></body></worldbody>
+        <sensor><framequat name="q" objtype="xbody" objname="b"/></sensor></mujoco>"#;
+
+    const BALL: &str = r#"<mujoco><worldbody><body><joint name="j" type="ball"/><geom size="0.1"/></body></worldbody>
+        <sensor><ballquat name="q" joint="j"/></sensor></mujoco>"#;
+
+    /// The start that a log of a turning body without an initial state gives, at 100 Hz.
+    fn start_of_turning(xml: &str, rows: usize) -> (InitialState, UnitQuaternion<f64>) {
         let plant = Plant::of(&Scene::from_xml("s", xml, &[]).unwrap()).unwrap();
         let first = UnitQuaternion::from_euler_angles(0.4, -1.2, 3.0);
         let reading = |k: usize| {
@@ -213,15 +222,21 @@ mod tests {
     /// that give no start.
     ///
     /// Cause: its spin began at 0, and residuals of an orientation wrap after half a turn, so that
-    /// no fit of the start found the spin.
+    /// no fit of the start found the spin. A ball joint began where the scene places it.
     #[test]
-    fn a_free_body_starts_with_the_spin_of_its_first_readings() {
-        let (start, first) = start_of_turning(100);
-        let own = first.inverse() * Vector3::new(0.0, 0.0, SPIN);
-        for k in 0..3 {
-            assert!((start.qvel[3 + k] - own[k]).abs() < 1e-9, "{start:?} {own}");
+    fn a_body_starts_with_the_spin_of_its_first_readings() {
+        for (xml, qpos, qvel) in [(FREE, 3, 3), (BALL, 0, 0)] {
+            let (start, first) = start_of_turning(xml, 100);
+            let read = unit_quaternion(&start.qpos[qpos..qpos + 4]);
+            assert!(read.angle_to(&first) < 1e-7, "{start:?} {first}");
+            let own = first.inverse() * Vector3::new(0.0, 0.0, SPIN);
+            for k in 0..3 {
+                let spin = start.qvel[qvel + k];
+                assert!((spin - own[k]).abs() < 1e-9, "{start:?} {own}");
+            }
+            // One reading tells none.
+            let still = start_of_turning(xml, 1).0.qvel;
+            assert_eq!(still, vec![0.0; qvel + 3]);
         }
-        // One reading tells none.
-        assert_eq!(start_of_turning(1).0.qvel, [0.0; 6]);
     }
 }

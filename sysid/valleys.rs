@@ -187,10 +187,13 @@ fn about(
     };
     watched.losses(&moved(std::slice::from_ref(&told.point)))?;
     let (point, least) = watched.lowest.clone().unwrap_or((middle, f64::INFINITY));
+    let residual = (2.0 * least / space.readings.max(1) as f64).sqrt();
     Ok(Fit {
         free: point.clone(),
         point,
-        residual: (2.0 * least / space.readings.max(1) as f64).sqrt(),
+        residual,
+        // A replay that noise alone explains is explained, whatever the roughness about it.
+        misfit: told.misfit.min(residual),
         ..found
     })
 }
@@ -247,5 +250,7 @@ mod tests {
             "the test needs a loss that misleads: {before}"
         );
         assert!(far(&found.point) < 0.005, "{:?}", found.point);
+        // The residuals vanish nearby, and a search that got there has explained the readings.
+        assert!(found.misfit <= found.residual && found.residual < 0.5);
     }
 }

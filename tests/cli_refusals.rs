@@ -434,7 +434,7 @@ fn a_true_value_that_no_engine_takes_is_named_by_its_option() {
         "rod-balancing",
         "--quiet",
         "--set",
-        "parameter.mass.target=body/rod/mass",
+        "parameter.mass.target=geom/rod_mass/mass",
         "--set",
         "parameter.mass.range=[0.1, 1]",
         "--truth",

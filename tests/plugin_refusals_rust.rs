@@ -128,6 +128,7 @@ fn what_an_identifier_hands_back_is_looked_at_before_it_is_used() {
         ("identifies-few-weights", "returned 1 weights for 2 samples"),
         ("identifies-long-samples", "entries of a sample for"),
         ("identifies-nan-residual", "the residual is NaN"),
+        ("identifies-negative-misfit", "the misfit is -1, below 0"),
     ] {
         let call = [
             "payload-swing",

@@ -7,6 +7,7 @@ use asid::core::registry::{BackendEntry, all};
 use asid::core::simulator::{ParameterChange, StepHook, StepView};
 use asid::core::{Backend, BatchConfig, Capabilities, Control, Model, Rollout, Scene, Simulator};
 use asid::effects::refined::Refined;
+use asid::mjcf::Plant;
 
 /// A block that slides on a floor along x.
 const BLOCK: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.001" cone="elliptic" impratio="10"/>
@@ -130,4 +131,28 @@ fn a_change_within_a_rollout_is_of_the_callers_column() {
         let error = run(0).unwrap_err().to_string();
         assert!(error.contains("an effect has or uses it"), "{error}");
     }
+}
+
+/// Symptom: an effect on a drive of a document that attaches another one acted on the wrong drive.
+/// Cause: the parser has the attached actuators and sensors before the document's own, and MuJoCo
+/// behind them.
+#[test]
+fn what_a_document_attaches_comes_behind_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let tool = r#"<mujoco><worldbody><body name="tool"><joint name="turn"/><geom size="0.1" mass="1"/></body></worldbody>
+      <actuator><motor name="drive" joint="turn"/></actuator><sensor><jointpos name="angle" joint="turn"/></sensor></mujoco>"#;
+    std::fs::write(folder.path().join("tool.xml"), tool).unwrap();
+    let xml = r#"<mujoco><asset><model name="tool" file="tool.xml"/></asset><worldbody><body name="arm"><joint name="lift"/>
+      <geom size="0.1" mass="1"/><attach model="tool" body="tool" prefix="a_"/></body></worldbody>
+      <actuator><position name="servo" joint="lift" kp="5" timeconst="0.1"/></actuator>
+      <sensor><jointpos name="height" joint="lift"/></sensor></mujoco>"#;
+    let scene = Scene::from_xml("arm", xml, &[]).unwrap();
+    let scene = scene.in_directory(Some(folder.path().to_owned()));
+    let plant = Plant::of(&scene).unwrap();
+    let actuators: Vec<&str> = plant.layout.actuators.iter().map(|a| &*a.name).collect();
+    assert_eq!(actuators, ["servo", "a_drive"]);
+    let sensors: Vec<&str> = plant.layout.sensors.iter().map(|s| &*s.name).collect();
+    assert_eq!(sensors, ["height", "a_angle"]);
+    let memoryless = plant.drives.iter().map(|d| d.unwrap().is_memoryless());
+    assert_eq!(memoryless.collect::<Vec<_>>(), [false, true]);
 }

@@ -161,8 +161,8 @@ mod tests {
     /// Symptom: a body that turned half a turn was shown half a turn off between two readings of a
     /// slow tracker.
     ///
-    /// Cause: each number of its quaternion was interpolated, across the change of sign of a tracker
-    /// that gives `w >= 0`.
+    /// Cause: each number of its quaternion was interpolated, across the change of sign of a
+    /// tracker that gives `w >= 0`.
     #[test]
     fn an_orientation_is_interpolated_along_the_shorter_way() {
         let xml = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="1"/></body></worldbody>

@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use asid_core::layout::{JointKind, Sensor};
 use asid_core::rng::Rng;
 use asid_core::{Layout, Result, Streams};
 use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
 use rand::Rng as _;
 use serde::Serialize;
 
@@ -73,23 +75,33 @@ fn direction(length: f64, rng: &mut Rng) -> [f64; 3] {
     [r * cos, r * sin, z].map(|x| length * x)
 }
 
-/// Whether the constant error of a signal of this kind and length is a rotation.
-fn is_angle(kind: &str, len: usize) -> bool {
-    len == 4 || kind == "jointpos"
+/// Whether the constant error of a sensor is a rotation: that of an orientation, or of the position
+/// of a joint that is no slide.
+fn is_angle(plant: &Plant, sensor: &Sensor) -> bool {
+    let own = plant.layout.sensors.iter().zip(&plant.sensors);
+    let mut reads = own.filter(|(s, _)| s.name == sensor.name).map(|(_, r)| *r);
+    let slides = match reads.next() {
+        Some(Reads::Joint(j)) => plant.layout.joints[j].kind == JointKind::Slide,
+        _ => false,
+    };
+    sensor.len == 4 || (sensor.kind == "jointpos" && !slides)
 }
 
-/// Draws the constant error of a signal of this kind and length.
-fn offset(kind: &str, len: usize, ranges: &PerturbationRanges, rng: &mut Rng) -> Vec<f64> {
-    let (position, rotation) = (ranges.tracker_offset, ranges.tracker_rotation);
-    match (kind, len) {
-        (_, 4) => direction(uniform(rotation, rng), rng).into(),
-        ("framepos" | "subtreecom", _) => direction(uniform(position, rng), rng).into(),
+/// Draws the constant error of a sensor, which is a rotation where `angle` is true.
+fn offset(sensor: &Sensor, angle: bool, ranges: &PerturbationRanges, rng: &mut Rng) -> Vec<f64> {
+    let range = if angle {
+        ranges.tracker_rotation
+    } else {
+        ranges.tracker_offset
+    };
+    match (&*sensor.kind, sensor.len) {
+        (_, 4) | ("framepos" | "subtreecom", _) => direction(uniform(range, rng), rng).into(),
         ("jointpos", _) => {
             let sign = if rng.random() { 1.0 } else { -1.0 };
-            vec![sign * uniform(rotation, rng)]
+            vec![sign * uniform(range, rng)]
         }
         // Speeds and forces are not tracked.
-        _ => vec![0.0; len],
+        _ => vec![0.0; sensor.len],
     }
 }
 
@@ -120,12 +132,12 @@ impl Perturbation {
             .iter()
             .map(|name| {
                 let sensor = layout.sensor(name)?;
-                if is_angle(&sensor.kind, sensor.len) {
+                let angle = is_angle(plant, sensor);
+                if angle {
                     angles.insert(name.clone());
                 }
                 let mut rng = of(&format!("offset of {name}"));
-                let drawn = offset(&sensor.kind, sensor.len, ranges, &mut rng);
-                Ok((name.clone(), drawn))
+                Ok((name.clone(), offset(sensor, angle, ranges, &mut rng)))
             })
             .collect::<Result<_>>()?;
         let [low, high] = ranges.tracker_every;
@@ -187,12 +199,17 @@ mod tests {
     <body name="door">
       <joint name="hinge"/>
       <geom name="leaf" type="box" size="0.4 0.02 0.8"/>
+      <body name="bolt">
+        <joint name="lock" type="slide"/>
+        <geom name="rod" type="box" size="0.1 0.01 0.01"/>
+      </body>
     </body>
   </worldbody>
   <sensor>
     <framepos name="handle" objtype="body" objname="door"/>
     <framequat name="leaning" objtype="body" objname="door"/>
     <jointpos name="angle" joint="hinge"/>
+    <jointpos name="thrown" joint="lock"/>
   </sensor>
 </mujoco>"#;
 
@@ -210,6 +227,7 @@ mod tests {
             ("angle", "off by up to 0.0 mm and 10.0 mrad"),
             ("leaning", "off by up to 0.0 mm and 10.0 mrad"),
             ("handle", "off by up to 2.0 mm and 0.0 mrad"),
+            ("thrown", "off by up to 2.0 mm and 0.0 mrad"),
         ] {
             let tracked = [sensor.to_owned()];
             let streams = Streams::new(0);

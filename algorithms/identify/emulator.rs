@@ -136,7 +136,7 @@ impl Emulator {
         let raw = at_best.norm_squared() / readings.max(1) as f64;
         emulator.residual = raw.sqrt();
         let mismatch = 2.0 * emulator.loss_at(&best) / (readings as f64 - n as f64).max(1.0);
-        emulator.misfit = mismatch.sqrt();
+        emulator.misfit = mismatch.max(0.0).sqrt();
         // Slopes of the residuals at the best point, for the ratio of the two covariances.
         let b = DMatrix::from_fn(m, n, {
             let slopes: Vec<DVector<f64>> = (0..n)

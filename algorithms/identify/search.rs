@@ -14,9 +14,10 @@ use crate::optimise::{Search, UpdateRule};
 /// Root mean square of the residual in units of noise and roughness together (1 for these alone)
 /// above which a search is taken to have ended in a local optimum.
 ///
-/// Worlds whose step, contacts and servos are slightly off leave 1.0 to 1.4 times the noise
-/// (`docs/results.md`), and no more of noise and roughness. Where the roughness comes in ten
-/// independent pieces, a right fit exceeds 1.5 in one of 80 cases (chi-squared).
+/// Worlds whose step, contacts and servos are slightly off leave residuals of 1.0 to 1.4 times the
+/// noise (`docs/results.md`), and so at most that in units of noise and roughness. Where the
+/// roughness comes in ten independent pieces, a right fit exceeds 1.5 in one of 80 cases
+/// (chi-squared).
 const LOST: f64 = 1.5;
 
 /// Budget of a search.

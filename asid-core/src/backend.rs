@@ -94,13 +94,6 @@ pub trait Model: Send + Sync {
         false
     }
 
-    /// Whether damping of joints is integrated implicitly, so that any strength of it is stable.
-    ///
-    /// True by default. Dry friction and elastic transmissions of joints rely on it.
-    fn damps_implicitly(&self) -> bool {
-        true
-    }
-
     /// Value of a target in the unchanged scene.
     ///
     /// # Errors

@@ -13,7 +13,7 @@ use asid_documents::guard::{guarded, one_line};
 use asid_documents::xml::{Fault, parse, spliced, wrong_eulerseq};
 
 use crate::error::{Error, Result};
-use normal_form::normal_form;
+use normal_form::{attached_last, normal_form};
 
 /// One MJCF document with its includes spliced in.
 #[derive(Clone)]
@@ -142,10 +142,11 @@ impl Scene {
         let base = self.directory.clone().unwrap_or_default();
         let xml = normal_form(&self.name, &self.xml)?;
         let parse = || mjcf_rs::Model::from_str(&xml, &base).map_err(|e| e.to_string());
-        let parsed = guarded("an MJCF document", parse).map_err(|message| Error::Scene {
+        let mut parsed = guarded("an MJCF document", parse).map_err(|message| Error::Scene {
             scene: self.name.clone(),
             message: one_line(&message),
         })?;
+        attached_last(&self.name, &xml, &mut parsed)?;
         Ok(Arc::clone(
             self.description.get_or_init(|| Arc::new(parsed)),
         ))

@@ -20,7 +20,7 @@ pub fn identifiability(
     best: &Explanation,
 ) -> Vec<CheckResult> {
     let fit = &none.fit;
-    // One of two values is chosen by replays, without a derivative, and is not fitted.
+    // Without the parameters of two values: replays choose these, and no fit moves them.
     let p = fit.free.len();
     if p == 0 {
         return vec![check(

@@ -22,8 +22,8 @@ pub(super) struct Sets<'e> {
     scores: Vec<f64>,
     /// Index in `all` of each set that was tried.
     places: Vec<usize>,
-    /// Index of the tried set that the search found if it has tolerances and names no effect,
-    /// beside those that the logs show without a search.
+    /// Index of the tried set that the search found, if it has tolerances and names nothing but
+    /// what the logs show without a search.
     pub(super) ordinary: Option<usize>,
     /// Price of a name: the logarithm of the number of candidates.
     price: f64,

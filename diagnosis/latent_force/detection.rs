@@ -133,8 +133,8 @@ mod tests {
     use super::*;
     use crate::latent_force::evidence::evidence;
 
-    /// Symptom: an effect at its detection limit earned half of the evidence that it must, where the
-    /// logs hardly show it. Cause: its prior was left out.
+    /// Symptom: an effect at its detection limit earned half of the evidence that it must, where
+    /// the logs hardly show it. Cause: its prior was left out.
     #[test]
     fn at_the_limit_a_column_earns_the_threshold() {
         for g in [0.01, 0.5, 4.0, 4e5] {

@@ -19,6 +19,7 @@ use super::context::Context;
 use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth};
 use super::step_map::LinearEpisode;
 use super::tangent::{part_way, retract};
+use super::walk::Walk;
 
 pub use missing::{LEAST_LEFT, Missing, NOTHING};
 
@@ -62,6 +63,15 @@ pub struct Estimate {
     pub smoothed: Vec<Smoothed>,
     /// Its log-likelihood.
     pub log_likelihood: f64,
+}
+
+/// Number of rows of a walk whose states a fit moves: a segment is replayed from its initial state.
+fn moved(walk: &Walk) -> usize {
+    if walk.segment.is_some() {
+        1
+    } else {
+        walk.len()
+    }
 }
 
 impl Estimate {
@@ -176,13 +186,7 @@ impl Estimate {
         let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
         let pairs = self.trajectory.iter_mut().zip(&self.smoothed);
         for ((states, smoothed), walk) in pairs.zip(&context.walks) {
-            // A segment is replayed from its initial state.
-            let rows = if walk.segment.is_some() {
-                1
-            } else {
-                walk.len()
-            };
-            let changes = smoothed.change.chunks_exact(nx).take(rows);
+            let changes = smoothed.change.chunks_exact(nx).take(moved(walk));
             for (state, change) in states.chunks_exact_mut(width).zip(changes) {
                 if change.iter().all(|x| x.is_finite()) {
                     retract(layout, state, change);
@@ -200,14 +204,8 @@ impl Estimate {
         let mut out = there.clone();
         let pairs = self.trajectory.iter().zip(&mut out.trajectory);
         for ((from, to), walk) in pairs.zip(&context.walks) {
-            // A segment is replayed from its initial state.
-            let rows = if walk.segment.is_some() {
-                1
-            } else {
-                walk.len()
-            };
             let each = from.chunks_exact(width).zip(to.chunks_exact_mut(width));
-            each.take(rows)
+            each.take(moved(walk))
                 .for_each(|(from, to)| part_way(layout, from, to, part));
         }
         let pairs = self.read.iter().zip(&mut out.read);

@@ -212,8 +212,8 @@ mod tests {
         lost((&[segment, Vec::new()], 1), &[here.clone(), here], &R)
     }
 
-    /// Symptom: replays of a puck that scattered in every row in which a camera saw the puck counted
-    /// as repeatable. Cause: rows without a reading counted as rows that repeat.
+    /// Symptom: replays of a puck that scattered in every row in which a camera saw the puck
+    /// counted as repeatable. Cause: rows without a reading counted as rows that repeat.
     #[test]
     fn the_share_of_lost_rows_is_that_of_the_rows_with_a_reading() {
         assert_eq!(lost_without(|_, _| false), 1.0);

@@ -324,9 +324,9 @@ mod tests {
         assert!((pairs[0].worth(4.0) - (pairs[0].gain - 4.0)).abs() < 1e-12);
     }
 
-    /// Symptom: on a machine with one joint two frictions were never tried together, and the verdict
-    /// was that the cause is unknown. Cause: pairs were looked for at joints with scales of their
-    /// own, and the only joint needs none.
+    /// Symptom: on a machine with one joint two frictions were never tried together, and the
+    /// verdict was that the cause is unknown. Cause: pairs were looked for at joints with scales of
+    /// their own, and the only joint needs none.
     #[test]
     fn two_laws_of_the_only_joint_are_seen_together_too() {
         // As above, with the smaller variance at a common scale.

@@ -191,8 +191,8 @@ mod tests {
         labels.map(candidate).into()
     }
 
-    /// Symptom: sets that were fitted had a share of the probability as sets that never were, one of
-    /// them with dry friction beside the law that refines it. Cause: a screened set was compared
+    /// Symptom: sets that were fitted had a share of the probability as sets that never were, one
+    /// of them with dry friction beside the law that refines it. Cause: a screened set was compared
     /// with the fits of its own round, and the finer law was added to the simpler one.
     #[test]
     fn what_was_fitted_in_any_round_is_not_told_as_screened_only() {

@@ -132,7 +132,8 @@ impl Features {
                 sums.push(sums[sums.len() - 1] + growth[i]);
             }
             let all = order.len();
-            for (threshold, text) in thresholds(&sorted) {
+            let (decimals, thresholds) = thresholds(&sorted);
+            for threshold in thresholds {
                 let below = sorted.partition_point(|x| *x < threshold);
                 let up_to = sorted.partition_point(|x| *x <= threshold);
                 let above = sums[all] - sums[up_to];
@@ -141,7 +142,7 @@ impl Features {
                     let merit = share - rows;
                     let is_better = best.as_ref().is_none_or(|(b, _)| merit > *b);
                     if rows < FEW && rows > FEWEST && share > MOST && is_better {
-                        best = Some((merit, format!("{name} {sign} {text}")));
+                        best = Some((merit, format!("{name} {sign} {threshold:.decimals$}")));
                     }
                 }
             }
@@ -150,12 +151,12 @@ impl Features {
     }
 }
 
-/// Thresholds between values that are sorted, each with its text, from which it reads back.
+/// Thresholds between values that are sorted, and the decimals that they are rounded to.
 ///
 /// Equal values are on one side of any threshold, so a quantity that is constant has none.
-fn thresholds(sorted: &[f64]) -> Vec<(f64, String)> {
+fn thresholds(sorted: &[f64]) -> (usize, Vec<f64>) {
     let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else {
-        return Vec::new();
+        return (0, Vec::new());
     };
     let decimals = (DIGITS - (last - first).log10()).ceil();
     let decimals = decimals.clamp(0.0, MOST_DECIMALS) as usize;
@@ -165,8 +166,7 @@ fn thresholds(sorted: &[f64]) -> Vec<(f64, String)> {
     let rounded = between.map(|w| (0.5 * (w[0] + w[1]) * scale).round() / scale + 0.0);
     let mut rounded: Vec<f64> = rounded.collect();
     rounded.dedup();
-    let with_text = |x: f64| (x, format!("{x:.decimals$}"));
-    rounded.into_iter().map(with_text).collect()
+    (decimals, rounded)
 }
 
 fn sorted(values: &[f64]) -> Vec<usize> {

@@ -8,7 +8,7 @@ use asid_core::{Episode, Error, Layout, Parameter, Result, Target};
 use asid_effects::refined_model::RefinedModel;
 use asid_logs::LogSettings;
 use asid_logs::counted::check_units;
-use asid_logs::episode::{ColumnMapping, some_log_has_columns};
+use asid_logs::episode::{ColumnMapping, check_mapped_columns};
 use asid_mjcf::Plant;
 use serde::Deserialize;
 
@@ -165,7 +165,7 @@ impl Study {
         let train = read(&document.train, "train")?;
         let test = read(&document.test, "test")?;
         let noted = notes.iter().map(|(_, noted)| noted);
-        some_log_has_columns(noted).map_err(|e| of_file(e, &fail))?;
+        check_mapped_columns(noted).map_err(|e| of_file(e, &fail))?;
         if let Some((name, _)) = test.iter().find(|(n, _)| train.iter().any(|(m, _)| m == n)) {
             return Err(fail(format!(
                 "{name} is among `train` and among `test`: what is held out must not be fitted"

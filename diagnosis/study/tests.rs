@@ -75,8 +75,8 @@ fn own() -> [Vec<ColumnMapping>; 4] {
     ]
 }
 
-/// Further mappings of the logs as they are read: all late, in another unit, one entry the other way
-/// round, and two entries exchanged.
+/// Further mappings of the logs as they are read: all late, in another unit, one entry the other
+/// way round, and two entries exchanged.
 fn further() -> [Vec<ColumnMapping>; 4] {
     let late = ColumnMapping {
         delay: 0.03,
@@ -98,8 +98,8 @@ fn further() -> [Vec<ColumnMapping>; 4] {
 /// Symptom: with the lines of the diagnosis in the study file, an entry was read in metres in place
 /// of millimetres, its column was missing, or the vector was as late as before.
 ///
-/// Cause: only a mapping of the same name was composed. That of the vector gives an entry its column
-/// and unit, and those of entries precede a line for the vector.
+/// Cause: only a mapping of the same name was composed. That of the vector gives an entry its
+/// column and unit, and those of entries precede a line for the vector.
 #[test]
 fn a_further_mapping_is_composed_with_that_of_its_vector_and_of_its_entries() {
     for own in own() {

@@ -54,10 +54,6 @@ impl Effect for Backlash {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
-    fn needs_implicit_damping(&self) -> bool {
-        true
-    }
-
     fn takes_drive(&self) -> bool {
         true
     }

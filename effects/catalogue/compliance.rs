@@ -55,10 +55,6 @@ impl Effect for Compliance {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
-    fn needs_implicit_damping(&self) -> bool {
-        true
-    }
-
     fn takes_drive(&self) -> bool {
         true
     }

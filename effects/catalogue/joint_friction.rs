@@ -227,10 +227,6 @@ impl Effect for Coulomb {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
-    fn needs_implicit_damping(&self) -> bool {
-        true
-    }
-
     fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
         let [force, offset, _] = values(site)?;
         document.joint(site.name)?.friction += force;
@@ -325,10 +321,6 @@ impl Effect for Stribeck {
 
     fn needs(&self) -> Capabilities {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
-    }
-
-    fn needs_implicit_damping(&self) -> bool {
-        true
     }
 
     fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
@@ -431,10 +423,6 @@ impl Effect for Load {
 
     fn needs(&self) -> Capabilities {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
-    }
-
-    fn needs_implicit_damping(&self) -> bool {
-        true
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

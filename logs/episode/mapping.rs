@@ -122,10 +122,12 @@ impl ColumnMapping {
         }
     }
 
-    /// Whether it is a mapping of a sensor, or of an entry of it.
-    pub(super) fn is_of(&self, sensor: &Sensor) -> bool {
-        let entry = |i| entry_name(&sensor.name, sensor.len, i);
-        self.name == sensor.name || (0..sensor.len).any(|i| self.name == entry(i))
+    /// First entry of a sensor that it maps; `None` if it maps none.
+    pub(super) fn first_entry_of(&self, sensor: &Sensor) -> Option<usize> {
+        let is_it = |i: &usize| {
+            self.name == sensor.name || self.name == entry_name(&sensor.name, sensor.len, *i)
+        };
+        (0..sensor.len).find(is_it)
     }
 
     /// Factor of the column, with sign and unit; an unknown unit counts as 1.

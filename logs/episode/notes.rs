@@ -11,7 +11,8 @@ pub struct LogNotes {
     pub misspelt: Vec<(String, String)>,
     /// Columns of sensors without any reading.
     pub empty: Vec<String>,
-    /// Sensors that `[[column]]` maps and the log lacks, each with the column of its first entry.
+    /// Sensors that `[[column]]` maps and the log lacks, each with the column of the first entry
+    /// that is mapped.
     pub lacking: Vec<(String, String)>,
     /// Sensors without a column and without a name in the model, by their default names.
     ///
@@ -29,11 +30,11 @@ pub struct LogNotes {
     pub remarks: Vec<String>,
 }
 
-/// Refuses a mapping of a sensor whose column is in none of some logs, which have these notes.
+/// Refuses a mapping of a sensor whose column is in none of the logs; each log has its `notes`.
 ///
 /// # Errors
 /// When there is one; the message is one line.
-pub fn some_log_has_columns<'n>(notes: impl IntoIterator<Item = &'n LogNotes>) -> Result<()> {
+pub fn check_mapped_columns<'n>(notes: impl IntoIterator<Item = &'n LogNotes>) -> Result<()> {
     let mut notes = notes.into_iter();
     let Some(first) = notes.next() else {
         return Ok(());
@@ -139,7 +140,8 @@ mod tests {
     }
 
     /// Symptom: a study was refused since one of its logs lacks a sensor, with the words "sensor
-    /// `angle` has 1 entries". A wrong column in the mapping of each entry of a vector went unnoticed.
+    /// `angle` has 1 entries". A wrong column in the mapping of each entry of a vector went
+    /// unnoticed.
     ///
     /// Cause: a mapping by the name of the sensor was taken for a promise that each log has its
     /// column, and one by the name of an entry was not looked at.
@@ -150,6 +152,8 @@ mod tests {
             ..ColumnMapping::of(name)
         };
         let tip = ["tip.0", "tip.1", "tip.2"].map(|name| from(name, &name.replace("tip", "hand")));
+        let one = notes_of("angle", &tip[1..2]);
+        assert_eq!(one.lacking, [("tip".into(), "hand.1".into())]);
         let mappings = [&[from("angle", "joint")][..], &tip].concat();
         let all = notes_of("joint,hand.0,hand.1,hand.2", &mappings);
         assert_eq!(all.lacking, []);
@@ -157,12 +161,12 @@ mod tests {
         assert_eq!(other.lacking, [("angle".into(), "joint".into())]);
         let another = notes_of("joint", &mappings);
         assert_eq!(another.lacking, [("tip".into(), "hand.0".into())]);
-        assert!(some_log_has_columns([&other, &all]).is_ok());
-        assert!(some_log_has_columns([&another, &other]).is_ok());
-        let error = some_log_has_columns([&other, &other]).unwrap_err();
+        assert!(check_mapped_columns([&other, &all]).is_ok());
+        assert!(check_mapped_columns([&another, &other]).is_ok());
+        let error = check_mapped_columns([&other, &other]).unwrap_err();
         let said = error.to_string();
         assert!(said.ends_with("no log has a column `joint`; is it `jiont`?"));
         assert_eq!(said.lines().count(), 1);
-        assert!(some_log_has_columns([&another, &another]).is_err());
+        assert!(check_mapped_columns([&another, &another]).is_err());
     }
 }

@@ -101,10 +101,8 @@ impl<'a> Reader<'a> {
             let entry = |i: usize| (s.len > 1).then_some(i);
             let found: Vec<_> = (0..s.len).map(|i| find(&s.name, entry(i))).collect();
             if found.iter().all(|(c, _)| c.is_none()) {
-                if mappings.iter().any(|m| m.is_of(s)) {
-                    let missing = found.into_iter().take(1).map(|(_, column)| column);
-                    lacking.extend(missing.map(|column| (s.name.clone(), column)));
-                }
+                let mapped = mappings.iter().filter_map(|m| m.first_entry_of(s)).min();
+                lacking.extend(mapped.map(|i| (s.name.clone(), found[i].1.clone())));
                 continue;
             }
             if let Some((_, missing)) = found.iter().find(|(c, _)| c.is_none()) {

@@ -51,12 +51,19 @@ pub fn match_speed(found: &mut Match, log: &RawLog, own: (&Series, f64), dimensi
             mapping.unit = Some((*unit).to_owned());
         }
     }
+    let unit = mapping.unit.as_deref().and_then(unit_factor);
+    let is_near = (wanted.abs() / unit.unwrap_or(1.0)).ln().abs() < NEAR;
+    if !is_near {
+        found.reasons.push(format!(
+            "its name has a unit in which it is not its position's speed: that is {wanted:.3} times it"
+        ));
+    }
     if wanted < 0.0 {
         mapping.sign = -1.0;
         found
             .reasons
             .push("runs against its position: one of the two counts the other way".into());
-    } else {
+    } else if is_near {
         found.reasons.push("is its position's speed".into());
     }
     found.values = values(speed, mapping);

@@ -29,7 +29,9 @@ impl Writer<'_, '_> {
         for i in 0..self.native.plant.layout.joints.len() {
             let joint = self.native.plant.layout.joints[i].clone();
             let node = self.elements.joints[i];
-            let damped = self.elements.said(node, spring_damper) == Some(true);
+            // A <freejoint> has no class for joints.
+            let damped =
+                node.has_tag_name("joint") && self.elements.said(node, spring_damper) == Some(true);
             if damped {
                 // From it MuJoCo would compute other coefficients for each mass and armature, and
                 // override those beside it.

@@ -89,6 +89,18 @@ mod tests {
         assert_eq!(ends("", two), Some([-9.0, 9.0]));
     }
 
+    /// Symptom: of two sections of defaults the first counted. Cause: they were looked through in
+    /// the document's order, and MuJoCo lets the later one override.
+    #[test]
+    fn the_last_section_of_defaults_counts() {
+        let xml = r#"<mujoco><default><joint actuatorfrcrange="-3 4"/></default>
+            <default><joint actuatorfrcrange="-2 2"/></default>
+            <worldbody><body><joint name="k"/><geom size="0.1"/></body></worldbody>
+            <actuator><motor joint="k"/></actuator></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("limits", xml, &[]).unwrap()).unwrap();
+        assert_eq!(plant.drives[0].unwrap().force_range, Some([-2.0, 2.0]));
+    }
+
     #[test]
     fn a_range_without_width_is_no_limit() {
         let motor = r#"<motor joint="k" forcerange="0 0" ctrlrange="0 0"/>"#;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use mjcf_rs::Model as Document;
 use mjcf_rs::body::{Joint, JointType};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use super::drive::{Drive, Limits, law};
 use super::limits;
@@ -32,7 +33,7 @@ impl Plant {
             joints.extend(body.joints.iter().map(|j| PlantJoint {
                 body: i,
                 anchor: j.pos,
-                axis: j.axis,
+                axis: unit(j.axis),
                 reference: j.ref_,
                 range: range(&model, j),
                 damping: j.damping,
@@ -77,51 +78,49 @@ impl Plant {
                 weld,
             });
         }
-        // Actuators that are attached from another document come after those of this one.
-        let remember = memory::of_actuators(scene.xml()).into_iter();
-        let remember = remember.chain(std::iter::repeat(false));
-        let of_joints = limits::of_joints(scene.xml(), model.compiler.autolimits);
-        let drives = model
-            .actuators
-            .iter()
-            .zip(&layout.actuators)
-            .zip(remember)
-            .map(|((a, place), remembers)| {
-                let drive = drive(&model, &layout, a, (place.ctrl_range, &of_joints))?;
-                Some(Drive { remembers, ..drive })
-            })
-            .collect();
         let sensors = model
             .sensors
             .iter()
             .map(|s| reads(&model, &layout, s))
             .collect();
         let contacts = contacts(&model, &layout, &bodies, &geoms);
-        let poses = model
-            .bodies
-            .iter()
-            .map(|entry| {
-                let (t, q) = (entry.body.pose.translation, entry.body.pose.rotation);
-                nalgebra::Isometry3::from_parts(
-                    nalgebra::Translation3::new(t.x, t.y, t.z),
-                    nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
-                        q.w, q.x, q.y, q.z,
-                    )),
-                )
-            })
-            .collect();
         Ok(Self {
+            drives: drives(scene, &model, &layout),
             layout,
             gravity: model.option.gravity,
             bodies,
             joints,
             geoms,
-            drives,
             sensors,
             contacts,
             force_limits: Vec::new(),
-            poses,
+            poses: poses(&model),
         })
+    }
+}
+
+/// Pose of each body in its parent.
+fn poses(model: &Document) -> Vec<Isometry3<f64>> {
+    let bodies = model.bodies.iter();
+    bodies
+        .map(|entry| {
+            let (t, q) = (entry.body.pose.translation, entry.body.pose.rotation);
+            let turn = Quaternion::new(q.w, q.x, q.y, q.z);
+            Isometry3::from_parts(
+                Translation3::new(t.x, t.y, t.z),
+                UnitQuaternion::from_quaternion(turn),
+            )
+        })
+        .collect()
+}
+
+/// An axis of length one, as engines compile it.
+fn unit(axis: [f64; 3]) -> [f64; 3] {
+    let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 {
+        axis.map(|x| x / length)
+    } else {
+        axis
     }
 }
 
@@ -134,6 +133,22 @@ fn range(model: &Document, joint: &Joint) -> Option<[f64; 2]> {
     joint
         .range
         .filter(|[low, high]| scalar && limited && low < high)
+}
+
+/// The drives of all actuators.
+fn drives(scene: &Scene, model: &Document, layout: &Layout) -> Vec<Option<Drive>> {
+    // Actuators that are attached from another document come after those of this one.
+    let remember = memory::of_actuators(scene.xml()).into_iter();
+    let remember = remember.chain(std::iter::repeat(false));
+    let of_joints = limits::of_joints(scene.xml(), model.compiler.autolimits);
+    let actuators = model.actuators.iter().zip(&layout.actuators);
+    actuators
+        .zip(remember)
+        .map(|((a, place), remembers)| {
+            let drive = drive(model, layout, a, (place.ctrl_range, &of_joints))?;
+            Some(Drive { remembers, ..drive })
+        })
+        .collect()
 }
 
 /// The drive of an actuator with a range of its command; `of_joints` are limits of joints.

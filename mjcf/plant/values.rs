@@ -120,6 +120,17 @@ mod tests {
         )
     }
 
+    /// Symptom: a force on a link pushed its joint by the wrong share, where an axis that the
+    /// document states as `1 1 0` was turned. Cause: engines scale an axis to length one, and the
+    /// plant held two of its entries as they stand.
+    #[test]
+    fn an_entry_of_an_axis_is_one_of_a_unit_axis() {
+        let xml = machine([1.0, 0.4, 0.5, 0.1]).replace(r#"axis="0 0 1""#, r#"axis="3 4 0""#);
+        let mut found = plant(&xml);
+        found.set(&"joint/j/axis/2".parse().unwrap(), [0.0, 0.5]);
+        assert_eq!(found.joints[0].axis, [0.6, 0.8, 0.5]);
+    }
+
     /// The plant with some values is that of the document with these values.
     #[test]
     fn values_are_those_of_a_document_that_has_them() {

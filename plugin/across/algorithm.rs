@@ -176,10 +176,6 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.steps())
     }
 
-    fn needs_implicit_damping(&self) -> bool {
-        self.run(|effect| effect.needs_implicit_damping())
-    }
-
     fn takes_drive(&self) -> bool {
         self.run(|effect| effect.takes_drive())
     }

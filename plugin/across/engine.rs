@@ -48,10 +48,6 @@ where
         self.run(|model| model.remembers_commands())
     }
 
-    fn damps_implicitly(&self) -> bool {
-        self.run(|model| model.damps_implicitly())
-    }
-
     fn nominal(&self, target: &Target) -> Result<f64> {
         self.try_run(|model| model.nominal(target))
     }

@@ -35,9 +35,11 @@ pub(super) fn check(
         counted("quantiles of an iteration", own, "unknowns", parameters)?;
     }
     for (value, what) in [
-        (found.residual, "the residual"),
-        (found.roughness, "the roughness"),
+        (Some(found.residual), "the residual"),
+        (found.misfit, "the misfit"),
+        (Some(found.roughness), "the roughness"),
     ] {
+        let Some(value) = value else { continue };
         finite(&[value], what)?;
         if value < 0.0 {
             return Err(format!("{what} is {value}, below 0"));

@@ -59,7 +59,7 @@ def arguments(options: Mapping[str, Option]) -> list[str]:
 
 
 def _text(value: object) -> str:
-    """A value as TOML and the command line write it; a text of its own needs no quotes there."""
+    """A value as TOML and the command line write it; a text that is the whole value has no quotes there."""
     if hasattr(value, "tolist") and not isinstance(value, numbers.Number):
         # A truth value or an array of NumPy.
         value = value.tolist()
@@ -73,7 +73,7 @@ def _text(value: object) -> str:
 def _quoted(item: object) -> str:
     """An item of a list as TOML writes it; a string of JSON is one of TOML."""
     if isinstance(item, (str, os.PathLike)):
-        return json.dumps(str(item), ensure_ascii=False)
+        return json.dumps(os.fspath(item), ensure_ascii=False)
     return _text(item)
 
 

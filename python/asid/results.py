@@ -298,8 +298,11 @@ class StudyIdentification(Result):
     held_out: list[str]
     identifier: str
     logs: list[str]
+    misfit: float
+    """Root mean square of the residuals at the best fit, in standard deviations of noise and of the simulator's roughness together."""
     parameters: list[Unknown]
     residual: float
+    """Root mean square of the residuals at the best fit, in standard deviations of the noise."""
     schema: int
     seed: int
     study: str

@@ -82,8 +82,9 @@ pub struct IdentifyResult {
     articulation: Option<Articulation>,
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     residual: f64,
-    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of the
-    /// simulator's roughness together; missing where the identifier fits nothing to the readings.
+    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of
+    /// the simulator's roughness together; missing where the identifier fits nothing to the
+    /// readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     misfit: Option<f64>,
     /// Start pose of each episode at the best fit.

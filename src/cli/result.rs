@@ -13,8 +13,8 @@ use super::world::RealResult;
 /// Layout version of `result.json`.
 pub const SCHEMA: u32 = 1;
 
-/// Largest misfit that chance and a slightly underestimated noise explain, in standard deviations of
-/// the noise and of the simulator's roughness.
+/// Largest misfit that chance and a slightly underestimated noise explain, in standard deviations
+/// of the noise and of the simulator's roughness.
 pub const UNEXPLAINED: f64 = 1.5;
 
 /// Text of a value or its deviation: four decimals, or two significant figures if those would be
@@ -172,8 +172,9 @@ pub struct RunResult {
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     residual: Option<f64>,
-    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of the
-    /// simulator's roughness together; missing where the identifier fits nothing to the readings.
+    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of
+    /// the simulator's roughness together; missing where the identifier fits nothing to the
+    /// readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     misfit: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

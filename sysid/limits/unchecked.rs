@@ -14,8 +14,8 @@ pub(super) fn is_checked(joint: &Joint) -> bool {
 /// Refuses limits of named parts that are not there, or are not compared with limits.
 pub(super) fn check_names(plant: &Plant, request: &LimitRequest) -> Result<()> {
     let layout = &plant.layout;
-    let joints = request.position.keys().chain(request.speed.keys());
-    for name in joints.filter(|n| !n.is_empty()) {
+    let speeds = request.speed.keys().filter(|n| !n.is_empty());
+    for name in request.position.keys().chain(speeds) {
         if !is_checked(layout.joint(name)?) {
             return Err(wrong(
                 "limit_position, limit_speed",
@@ -94,10 +94,16 @@ mod tests {
         for said in [by_speed, by_position] {
             assert!(said.contains("`wrist` is no hinge or slide"), "{said}");
         }
+        // Unlike a speed or a force, a range is that of a single joint.
+        let unnamed = refused(LimitRequest {
+            position: [(String::new(), [-1.0, 1.0])].into(),
+            ..LimitRequest::default()
+        });
+        assert!(unnamed.contains("joint"), "{unnamed}");
     }
 
-    /// Symptom: "all limits hold" with `--limit-force 5`, although the force of a tendon's motor was
-    /// not looked at.
+    /// Symptom: "all limits hold" with `--limit-force 5`, although the force of a tendon's motor
+    /// was not looked at.
     ///
     /// Cause: a limit without a name passed over actuators whose force is not computed.
     #[test]

@@ -239,9 +239,9 @@ fn a_joint_may_stay_at_the_end_of_its_range_where_the_limit_ends_before_it() {
     );
 }
 
-/// Symptom: "your logs so far tell it to" the same with any `--noise`. Cause: the option counted for
-/// the motion alone, and the logs had the noise of the study. In a linear machine a deviation is
-/// proportional to the noise.
+/// Symptom: what "your logs so far tell" was the same with any `--noise`. Cause: the option counted
+/// for the motion alone, and the logs had the noise of the study. In a linear machine a deviation
+/// is proportional to the noise.
 #[test]
 fn the_noise_of_the_options_holds_for_the_logs_too() {
     let place = Workplace::new();

@@ -1,5 +1,5 @@
-//! Imports whose mapping needs care: a column that a log lacks, two faults of one column, and a row of
-//! units.
+//! Imports whose mapping needs care: a column that a log lacks, two faults of one column, and a row
+//! of units.
 
 use asid::diagnosis::study::Study;
 use asid::logs::episode::ColumnMapping;
@@ -46,8 +46,8 @@ fn a_log_without_a_mapped_column_is_named() {
     assert_eq!(signals.len(), 2, "{signals:?}");
 }
 
-/// Symptom: the column that counted the other way got the delay of a late clock as well, and no other
-/// column did. No common delay was left for the diagnosis to find.
+/// Symptom: the column that counted the other way got the delay of a late clock as well, and no
+/// other column did. No common delay was left for the diagnosis to find.
 ///
 /// Cause: the line of a column holds the corrections of all its faults, also that of a clock, which
 /// an import leaves to the diagnosis.

@@ -68,8 +68,8 @@ fn taken(logs: &Logs, segment: Option<usize>) -> Taken {
 }
 
 /// Symptom: a sensor of a wrong scale lost evidence in every segment, because the prior of the
-/// initial state contradicted it. Cause: the position that reads as logged was sought by one step to
-/// first order, `(2 - s) x` in place of `x / s`.
+/// initial state contradicted it. Cause: the position that reads as logged was sought by one step
+/// to first order, `(2 - s) x` in place of `x / s`.
 #[test]
 fn a_segment_begins_where_a_scaled_sensor_reads_as_logged() {
     let machine = slide();

@@ -78,7 +78,7 @@ fn a_force_under_a_command_from_before_the_log_is_no_gap() {
 ///
 /// Cause: that log alone was searched for another command, and had none.
 #[test]
-fn nor_is_it_if_the_first_log_holds_its_command() {
+fn a_force_under_a_command_that_the_first_log_holds_is_no_gap_either() {
     let command = |row, episode| match episode {
         0 => 0.5,
         _ => moving(row, episode),

@@ -1,10 +1,9 @@
 //! Limits of drives and of their joints, values of both that differ from the document's, and
 //! integrators that an effect cannot do with.
 
-use super::bench::{Bench, engines_for, engines_that_load, near, scene};
+use super::bench::{Bench, engines_that_load, near, scene};
 use super::{DT, INERTIA, ROTOR};
 use asid::core::Target;
-use asid::effects::refined::Refined;
 
 /// Inertia of the drive's own rotor, kg m².
 const ARMATURE: f64 = 0.05;
@@ -155,63 +154,5 @@ fn gears_and_limits_of_the_simulation_are_those_of_the_effects() {
                 }
             }
         }
-    }
-}
-
-/// Symptom: with the Runge-Kutta integrator dry friction let a held joint go, and play or elasticity
-/// ended in numbers that are not finite.
-///
-/// Cause: they set a damping that is stable only where the engine integrates it implicitly.
-#[test]
-fn effects_that_need_implicit_damping_are_refused_where_an_engine_has_none() {
-    let driven = machine("", r#"<motor name="drive" joint="spin"/>"#);
-    let option = |text: &str, flag: &str| {
-        let options = format!("{text}>{flag}</option>");
-        driven.replace(r#"integrator="implicitfast"/>"#, &options)
-    };
-    let flag = r#"<flag eulerdamp="disable"/>"#;
-    for (xml, implicit) in [
-        (option(r#"integrator="RK4""#, ""), false),
-        (option(r#"integrator="Euler""#, flag), false),
-        (option(r#"integrator="Euler""#, ""), true),
-        (option(r#"integrator="implicit""#, flag), true),
-        (driven.clone(), true),
-    ] {
-        for backend in engines_that_load(OF_DRIVES[0], &xml) {
-            if backend.name() != "mujoco" {
-                continue;
-            }
-            let model = backend.load(&scene(&xml)).unwrap();
-            assert_eq!(model.damps_implicitly(), implicit, "{xml}");
-            for (effect, needs) in [
-                ("coulomb-friction@spin:force=5", true),
-                ("stribeck-friction@spin:coulomb=5", true),
-                (OF_DRIVES[0], true),
-                (OF_DRIVES[1], true),
-                (OF_DRIVES[2], true),
-                // A limit of a force is as stable as the engine.
-                (OF_DRIVES[3], false),
-                ("viscous-friction@spin:damping=1", false),
-            ] {
-                let specs = [effect.parse().unwrap()];
-                let refined = Refined::load(&*backend, &scene(&xml), &specs);
-                let Err(error) = refined else {
-                    assert!(implicit || !needs, "{effect}, {xml}");
-                    continue;
-                };
-                let error = error.to_string();
-                assert!(!implicit && needs, "{effect}, {xml}: {error}");
-                assert!(error.contains("implicitfast"), "{error}");
-            }
-        }
-    }
-}
-
-#[test]
-fn an_engine_damps_implicitly_unless_it_says_otherwise() {
-    let driven = machine("", r#"<motor name="drive" joint="spin"/>"#);
-    for backend in engines_for(OF_DRIVES[0]) {
-        let model = backend.load(&scene(&driven)).unwrap();
-        assert!(model.damps_implicitly(), "{}", backend.name());
     }
 }

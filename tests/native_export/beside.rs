@@ -66,6 +66,21 @@ fn a_time_constant_of_a_spring_is_written_as_its_stiffness_and_damping() {
     }
 }
 
+/// Symptom: MuJoCo refused an exported document, in which a `<freejoint>` had a `springdamper`.
+///
+/// Cause: the class for joints, of which a `<freejoint>` is none, was taken for its own.
+#[test]
+fn a_free_joint_has_no_spring_of_a_class() {
+    let joint = r#"<freejoint name="ball"/>"#;
+    let xml = format!(
+        r#"<mujoco><default><joint springdamper="0.5 0.3"/></default><worldbody>
+        <body name="ball" pos="0 0 1">{joint}<geom name="ball" size="0.05" mass="1"/></body></worldbody></mujoco>"#
+    );
+    let written = exported(&refined(&xml, &[], &["mass@ball:factor=2"])).xml;
+    assert!(written.contains(joint), "{written}");
+    assert!(written.contains(r#"mass="2""#), "{written}");
+}
+
 /// Symptom: the document of a model with a gap of no width had a range that MuJoCo refuses.
 ///
 /// Cause: an effect at its null values was written, which the simulation is without.

@@ -1,4 +1,4 @@
-//! The document as the parser of descriptions reads it rightly.
+//! A document in the form in which the parser of descriptions reads it as MuJoCo does.
 //!
 //! The parser takes a list of numbers, and a place, from one element or one class. In MJCF the
 //! later entries of a shorter list come from the class around, and so does the rotation beside a
@@ -7,15 +7,16 @@
 //! as MuJoCo compiles it. Everything else stays as it is, to the letter. Documents that `<attach>`
 //! brings in are read as they are.
 
+mod edits;
 mod rotation;
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use asid_documents::xml::{Fault, parse};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::Node;
 
+use edits::Edits;
 use rotation::{ROTATIONS, rotation};
 
 /// The normal form of a document; the document itself where it has that form.
@@ -28,14 +29,43 @@ pub(super) fn normal_form<'x>(name: &str, xml: &'x str) -> Result<Cow<'x, str>, 
     let mut writer = Writer {
         name,
         root,
-        edits: Vec::new(),
+        edits: Edits::default(),
     };
     writer.first_orders();
     writer.actuators();
     for world in root.children().filter(|n| n.has_tag_name("worldbody")) {
         writer.parts(world, Around::default())?;
     }
-    Ok(edited(xml, writer.edits))
+    Ok(writer.edits.applied(xml))
+}
+
+/// Puts the actuators and sensors of attached documents behind those of the document, where MuJoCo
+/// has them; the parser has them before.
+///
+/// # Errors
+/// When the document is not well-formed.
+pub(super) fn attached_last(
+    name: &str,
+    xml: &str,
+    parsed: &mut mjcf_rs::Model,
+) -> Result<(), Fault> {
+    if !xml.contains("<attach") {
+        return Ok(());
+    }
+    let document = parse(name, xml)?;
+    let own = |section: &str| {
+        let sections = document.root_element().children();
+        let sections = sections.filter(|n| n.has_tag_name(section));
+        let all = sections.flat_map(|s| s.children());
+        all.filter(Node::is_element).count()
+    };
+    let attached = |all: usize, section: &str| all.saturating_sub(own(section));
+    let (actuators, sensors) = (parsed.actuators.len(), parsed.sensors.len());
+    parsed
+        .actuators
+        .rotate_left(attached(actuators, "actuator"));
+    parsed.sensors.rotate_left(attached(sensors, "sensor"));
+    Ok(())
 }
 
 /// What is around an element.
@@ -52,24 +82,24 @@ struct Writer<'d> {
     /// Name of the document.
     name: &'d str,
     root: Node<'d, 'd>,
-    /// Ranges of the text and their replacements; an empty range is an insertion.
-    edits: Vec<(Range<usize>, String)>,
+    edits: Edits,
 }
 
 impl<'d> Writer<'d> {
-    /// Leaves the linear coefficient of stiffness and damping.
+    /// Removes all but the linear coefficient of stiffness and damping.
     fn first_orders(&mut self) {
         for node in self.root.descendants().filter(|n| n.has_tag_name("joint")) {
             for attribute in ["stiffness", "damping"] {
                 let all = node.attribute(attribute).and_then(numbers_of);
                 if let Some([first, _, ..]) = all.as_deref() {
-                    self.set_numbers(node, attribute, &[*first]);
+                    self.edits.set_numbers(node, attribute, &[*first]);
                 }
             }
         }
     }
 
-    /// Completes the coefficients of `<general>`, in whose class other actuators are too.
+    /// Completes the coefficients of actuators from what their classes say of `<general>`, which
+    /// holds for all kinds.
     fn actuators(&mut self) {
         let sections = self.root.children().filter(|n| n.has_tag_name("actuator"));
         let all = sections.flat_map(|s| s.children());
@@ -95,7 +125,7 @@ impl<'d> Writer<'d> {
                 "frame" => {
                     let outer = around.frame.unwrap_or_else(Isometry3::identity);
                     let frame = Some(outer * self.pose(child, &[child])?);
-                    self.strip(child);
+                    self.edits.strip(child);
                     self.parts(child, Around { frame, class })?;
                 }
                 "inertial" => self.place(child, &[child], around)?,
@@ -145,7 +175,7 @@ impl<'d> Writer<'d> {
         if said.first().is_some_and(|first| first.len() < longest) {
             let entry = |i: usize| said.iter().find_map(|list| list.get(i)).copied();
             let whole: Vec<f64> = (0..longest).filter_map(entry).collect();
-            self.set_numbers(node, attribute, &whole);
+            self.edits.set_numbers(node, attribute, &whole);
         }
     }
 
@@ -164,17 +194,16 @@ impl<'d> Writer<'d> {
             let [a, b, c, d, e, f]: [f64; 6] = self.numbers(node, "fromto", text)?;
             let ends = [[a, b, c], [d, e, f]].map(|end| frame * Point3::from(end));
             let ends: [[f64; 3]; 2] = ends.map(|end| end.coords.into());
-            self.set_numbers(node, "fromto", &ends.concat());
+            self.edits.set_numbers(node, "fromto", &ends.concat());
             return Ok(());
         }
         let pose = frame * self.pose(node, sources)?;
         let q = pose.rotation;
-        self.set_numbers(node, "pos", pose.translation.vector.as_slice());
-        self.set_numbers(node, "quat", &[q.w, q.i, q.j, q.k]);
+        self.edits
+            .set_numbers(node, "pos", pose.translation.vector.as_slice());
+        self.edits.set_numbers(node, "quat", &[q.w, q.i, q.j, q.k]);
         for other in &ROTATIONS[1..] {
-            if let Some(own) = node.attribute_node(*other) {
-                self.edits.push((own.range(), String::new()));
-            }
+            self.edits.remove(node, other);
         }
         Ok(())
     }
@@ -194,7 +223,7 @@ impl<'d> Writer<'d> {
         for (source, names) in [(position, &["pos"][..]), (rotation, &ROTATIONS[..])] {
             for name in names.iter().filter(|_| source > 0) {
                 if let Some(value) = sources[source].attribute(*name) {
-                    self.set(node, name, value);
+                    self.edits.set(node, name, value);
                 }
             }
         }
@@ -216,8 +245,9 @@ impl<'d> Writer<'d> {
         };
         let anchor = frame * Point3::from(vector("pos", [0.0; 3])?);
         let axis = frame * Vector3::from(vector("axis", [0.0, 0.0, 1.0])?);
-        self.set_numbers(node, "pos", anchor.coords.as_slice());
-        self.set_numbers(node, "axis", axis.as_slice());
+        self.edits
+            .set_numbers(node, "pos", anchor.coords.as_slice());
+        self.edits.set_numbers(node, "axis", axis.as_slice());
         Ok(())
     }
 
@@ -226,7 +256,7 @@ impl<'d> Writer<'d> {
         if let (Some(_), Some(class), false) =
             (around.frame, around.class, node.has_attribute(attribute))
         {
-            self.set(node, attribute, class);
+            self.edits.set(node, attribute, class);
         }
     }
 
@@ -283,45 +313,6 @@ impl<'d> Writer<'d> {
         let line = node.document().text_pos_at(node.range().start).row;
         Fault::new(self.name, format!("line {line}: {what}"))
     }
-
-    fn set_numbers(&mut self, node: Node<'d, 'd>, attribute: &str, values: &[f64]) {
-        let texts: Vec<String> = values.iter().map(|x| format!("{x}")).collect();
-        self.set(node, attribute, &texts.join(" "));
-    }
-
-    /// Gives an element an attribute.
-    fn set(&mut self, node: Node<'d, 'd>, attribute: &str, value: &str) {
-        let value = value.replace('&', "&amp;").replace('<', "&lt;");
-        let value = value.replace('"', "&quot;");
-        self.edits.push(match node.attribute_node(attribute) {
-            Some(own) => (own.range_value(), value),
-            None => {
-                let at = after_name(node);
-                (at..at, format!(" {attribute}=\"{value}\""))
-            }
-        });
-    }
-
-    /// Removes the tags around the content of an element.
-    fn strip(&mut self, node: Node<'d, 'd>) {
-        let (text, whole) = (node.document().input_text(), node.range());
-        let attributes = node.attributes().map(|a| a.range().end);
-        let from = attributes.max().unwrap_or_else(|| after_name(node));
-        let open = text[from..whole.end].find('>');
-        let open = open.map_or(whole.end, |i| from + i + 1);
-        self.edits.push((whole.start..open, String::new()));
-        if let Some(close) = text[open..whole.end].rfind("</") {
-            self.edits.push((open + close..whole.end, String::new()));
-        }
-    }
-}
-
-/// Place in the text after the name in the tag of an element.
-fn after_name(node: Node<'_, '_>) -> usize {
-    let start = node.range().start;
-    let tag = &node.document().input_text()[start..];
-    let end = tag.find(|c: char| c.is_whitespace() || c == '/' || c == '>');
-    start + end.unwrap_or(tag.len())
 }
 
 /// What the first source that has an attribute says.
@@ -332,23 +323,6 @@ fn said<'d>(sources: &[Node<'d, 'd>], attribute: &str) -> Option<&'d str> {
 /// The numbers of a text; `None` where one is none.
 fn numbers_of(text: &str) -> Option<Vec<f64>> {
     text.split_whitespace().map(|x| x.parse().ok()).collect()
-}
-
-/// A text with some ranges replaced.
-fn edited(text: &str, mut edits: Vec<(Range<usize>, String)>) -> Cow<'_, str> {
-    if edits.is_empty() {
-        return Cow::Borrowed(text);
-    }
-    edits.sort_by_key(|(range, _)| (range.start, range.end));
-    let mut out = String::with_capacity(text.len());
-    let mut copied = 0;
-    for (range, with) in edits {
-        out.push_str(&text[copied..range.start]);
-        out.push_str(&with);
-        copied = range.end;
-    }
-    out.push_str(&text[copied..]);
-    Cow::Owned(out)
 }
 
 #[cfg(test)]

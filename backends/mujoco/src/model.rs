@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use asid_core::{BatchConfig, Model, Result, Scene, Simulator};
 use asid_core::{Layout, Target};
-use mujoco_rs::mujoco_c::{mjtDisableBit, mjtEnableBit, mjtIntegrator};
+use mujoco_rs::mujoco_c::mjtEnableBit;
 
 use crate::compiled::{Compiled, compile, refused};
 use crate::layout::layout;
 use crate::parameter::Plan;
-use crate::rollout::has_halves;
 use crate::simulator::MujocoSimulator;
 use crate::target::Column;
 
@@ -57,15 +56,6 @@ impl Model for MujocoModel {
         let model = &self.compiled.model;
         let buffers = model.actuator_historyadr();
         model.na() > 0 || buffers.iter().any(|at| *at >= 0)
-    }
-
-    /// Runge-Kutta takes damping as it takes any force, and so does Euler where `eulerdamp` is
-    /// disabled.
-    fn damps_implicitly(&self) -> bool {
-        let options = self.compiled.model.opt();
-        let euler = options.integrator == mjtIntegrator::mjINT_EULER as i32;
-        let explicit = options.disableflags & mjtDisableBit::mjDSBL_EULERDAMP as i32 != 0;
-        has_halves(&self.compiled.model) && !(euler && explicit)
     }
 
     fn nominal(&self, target: &Target) -> Result<f64> {

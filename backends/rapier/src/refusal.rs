@@ -8,6 +8,7 @@
 use std::collections::HashSet;
 
 use asid_core::{Error, Result, Scene};
+use asid_mjcf::document::is_of_higher_order;
 use asid_mjcf::plant::law;
 use mjcf_rs::Model;
 use mjcf_rs::body::{GeomType, JointType};
@@ -192,12 +193,8 @@ fn check_document(scene: &Scene) -> Result<()> {
 
 /// The attribute of a joint that has coefficients of higher order.
 fn of_higher_order(node: &Node<'_, '_>) -> Option<&'static str> {
-    let higher = |text: &str| {
-        let mut higher = text.split_whitespace().skip(1);
-        higher.any(|x| x.parse::<f64>() != Ok(0.0))
-    };
     let mut both = ["stiffness", "damping"].into_iter();
-    both.find(|a| node.has_tag_name("joint") && node.attribute(*a).is_some_and(higher))
+    both.find(|a| node.has_tag_name("joint") && node.attribute(*a).is_some_and(is_of_higher_order))
 }
 
 /// Flags of MuJoCo's solver, which do not affect the physics.

@@ -54,13 +54,13 @@ pub enum SensorSlot {
 impl SensorSlot {
     /// The sensors of a parsed scene, in its order.
     pub fn of_scene(scene: &Scene, model: &Model, layout: &Layout) -> Vec<Self> {
-        let late = late(scene.xml());
-        // The parser puts sensors of attached documents before those of this one.
-        let attached = model.sensors.len().saturating_sub(late.len());
-        let sensors = model.sensors.iter().enumerate();
+        // Sensors of attached documents come after those of this one.
+        let late = late(scene.xml()).into_iter();
+        let late = late.chain(std::iter::repeat(false));
+        let sensors = model.sensors.iter().zip(late);
         sensors
-            .map(|(i, sensor)| {
-                if i >= attached && late[i - attached] {
+            .map(|(sensor, late)| {
+                if late {
                     Self::Unread("with a delay or an interval of its own".into())
                 } else {
                     Self::of(sensor, model, layout)

@@ -25,7 +25,8 @@ pub struct Structure {
     pub places: Vec<Vector3<f64>>,
     /// Anchor of each joint in its body, m.
     pub anchors: Vec<Vector3<f64>>,
-    /// Axis of each joint in its body; only its direction matters.
+    /// Axis of each joint in its body. It has length one until a parameter changes it; only its
+    /// direction matters.
     pub axes: Vec<Vector3<f64>>,
 }
 
@@ -95,7 +96,7 @@ impl MassModel {
                 .map(|b| convert::parts(&b.body.pose).0)
                 .collect(),
             anchors: joints().map(|j| Vector3::from(j.pos)).collect(),
-            axes: joints().map(|j| Vector3::from(j.axis)).collect(),
+            axes: joints().map(|j| direction(j.axis)).collect(),
         };
         for entry in &model.bodies {
             let first = mass_model.geoms.len();
@@ -188,6 +189,12 @@ impl MassModel {
         }
         inertia
     }
+}
+
+/// The direction of an axis; the axis itself where it has none.
+fn direction(axis: [f64; 3]) -> Vector3<f64> {
+    let axis = Vector3::from(axis);
+    axis.try_normalize(0.0).unwrap_or(axis)
 }
 
 /// The `<inertial>` of a body, if the compiler's settings use it.

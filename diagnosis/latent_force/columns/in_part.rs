@@ -170,8 +170,8 @@ mod tests {
 
     use super::*;
 
-    /// Motion along ten rows in which a cart moves by `step`, m, per row; its camera, with a noise of
-    /// 1 m, sees it in some of them.
+    /// Motion along ten rows in which a cart moves by `step`, m, per row; its camera, with a noise
+    /// of 1 m, sees it in some of them.
     fn motion_seen_in(step: f64, is_seen: impl Fn(usize) -> bool) -> f64 {
         let scene = r#"<mujoco><worldbody><body name="cart">
             <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>

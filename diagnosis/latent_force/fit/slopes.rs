@@ -29,9 +29,9 @@ const MISLED_START: f64 = 1.0;
 /// Information of a segment's readings about a coordinate of its initial state, relative to the
 /// prior's, below which the coordinate counts as blind.
 ///
-/// The evidence changes by half of this. Where a body touches another, less have the coordinates
-/// that the contact blocks, and the rotations of a body whose orientation no sensor reads: their
-/// prior is the narrowest. The others have 0.1 or more.
+/// The evidence changes by half of this. Coordinates that a contact blocks have less, and so do the
+/// rotations of a body whose orientation no sensor reads, because their prior is the narrowest. The
+/// others have 0.1 or more.
 const BLIND: f64 = 1e-5;
 
 /// Derivatives of each walk, and the point at which they were taken.

@@ -83,9 +83,9 @@ fn all_sets(outcome: &Outcome, candidates: &[Candidate], known: &[usize]) -> Vec
         let members = named(set);
         match sets.iter_mut().find(|s| named(s) == members) {
             // A set with tolerances and the same set without them are the same answer.
-            Some(known) if stands(set) && !stands(known) => *known = set.clone(),
-            Some(known) if stands(known) && !stands(set) => {}
-            Some(known) if known.fitted.evidence < set.fitted.evidence => *known = set.clone(),
+            Some(same) if stands(set) && !stands(same) => *same = set.clone(),
+            Some(same) if stands(same) && !stands(set) => {}
+            Some(same) if same.fitted.evidence < set.fitted.evidence => *same = set.clone(),
             Some(_) => {}
             None => sets.push(set.clone()),
         }

@@ -311,8 +311,8 @@ mod tests {
         assert!(left(&[1.0, 1.0, 0.0, 1.0, -1.0, 0.0]) < 1e-9);
     }
 
-    /// Symptom: the order of laws changed with the unit of a parameter of the study. Cause: a column
-    /// of small numbers counted as one of zeros.
+    /// Symptom: the order of laws changed with the unit of a parameter of the study. Cause: a
+    /// column of small numbers counted as one of zeros.
     #[test]
     fn what_a_parameter_makes_up_for_does_not_depend_on_its_unit() {
         for unit in [1e-9, 1e-6, 1.0, 1e6] {

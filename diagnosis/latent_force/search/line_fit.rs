@@ -12,6 +12,8 @@ const STEPS: usize = 4;
 const PARTS: [f64; 2] = [1.0, 0.5];
 /// Share of the power above the noise that a step must remove for a further step.
 const GAINED: f64 = 0.05;
+/// Change of the residuals over a finite difference, relative to them, that counts as rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// A value to fit.
 pub(super) struct Value {
@@ -81,7 +83,12 @@ fn step(
         if there.len() != here.len() {
             return Ok(None);
         }
-        slopes.set_column(i, &((there - &here) / by));
+        let change = there - &here;
+        // Rounding leads to no value.
+        if change.norm() <= ROUNDING * here.norm() {
+            continue;
+        }
+        slopes.set_column(i, &(change / by));
     }
     if slopes.iter().chain(here.iter()).any(|x| !x.is_finite()) {
         return Ok(None);
@@ -160,8 +167,9 @@ mod tests {
         );
     }
 
-    /// Symptom: a servo's stiffness in N/m stayed where it was, although replays depend on it. Cause:
-    /// its column is small, since a newton per metre does little, and counted as one of zeros.
+    /// Symptom: a servo's stiffness in N/m stayed where it was, although replays depend on it.
+    /// Cause: its column is small, since a newton per metre does little, and counted as one of
+    /// zeros.
     #[test]
     fn a_value_is_found_in_any_unit() {
         let residuals = |z: &[f64]| Ok(vec![40e-6 * (z[0] - 2e6)]);

@@ -88,9 +88,9 @@ impl<'a> Filter<'a> {
     /// Returns the log-likelihood of all readings.
     ///
     /// The first readings of a late sensor show the machine before the first row, and no state here
-    /// predicts them. Of two that show the same row, only the later one is taken. Each of the others
-    /// counts as the mean of its entry's readings. So models with and without a delay are compared
-    /// on equally many readings.
+    /// predicts them. Of two that show the same row, only the later one is taken. Each of the
+    /// others counts as the mean of its entry's readings. So models with and without a delay are
+    /// compared on equally many readings.
     pub(super) fn total(&self) -> f64 {
         let early = |i: usize| self.problem.linear.early.get(i).copied().unwrap_or(0.0);
         let entries = self.log_likelihood.iter().enumerate();

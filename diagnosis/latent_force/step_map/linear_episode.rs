@@ -53,7 +53,7 @@ pub struct LinearEpisode {
     /// Number of readings of each entry, for a late sensor, that measure a time before the first
     /// row, or the row of a later reading; `ns`, or empty for none.
     pub early: Vec<f64>,
-    /// Row that each reading measures, `rows x ns`, or empty if no sensor is late; `None` for a time
+    /// Row that each reading measures, `rows x ns`; empty if no sensor remembers. `None` for a time
     /// before the first row, and for a missing reading of a late sensor.
     pub assigned: Vec<Option<usize>>,
     /// Change of `f` by each variation, `(rows - 1) x nx x m`.

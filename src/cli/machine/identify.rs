@@ -71,7 +71,11 @@ pub struct IdentifyResult {
     /// Combinations of unknowns that the logs do not see.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unseen: Vec<Direction>,
+    /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     residual: f64,
+    /// Root mean square of the residuals at the best fit, in standard deviations of noise and of
+    /// the simulator's roughness together.
+    misfit: f64,
     gap: GapResult,
     logs: Vec<String>,
     held_out: Vec<String>,
@@ -148,6 +152,7 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         parameters: ParameterResult::all(&found.posterior, None),
         unseen: found.posterior.unseen.clone(),
         residual: found.residual,
+        misfit: found.misfit,
         gap,
         logs: names(&study.train),
         held_out: names(&study.test),
@@ -171,6 +176,8 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
     let mut report = report(&subject, &study.parameters, &found, &config, wall_s);
     report.answer = sentence;
     report.notes = caveats;
+    let warning = warning(&result);
+    report.notes.extend(warning.clone());
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
@@ -188,19 +195,29 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         Ok(())
     })?;
     out.tell(common.json, &result, &lines)?;
-    if result.gap.identified > result.gap.nominal {
-        failure::warn(
-            "the fitted model replays the logs held out worse than the model as given: something else differs; \
-             `asid diagnose` looks for what",
-        );
-    } else if found.residual > UNEXPLAINED {
-        failure::warn(&format!(
-            "the fitted model leaves {:.1} times the sensors' noise: something else differs, and the intervals hold only as far as the \
-             model is right; `asid diagnose` looks for what",
-            found.residual
-        ));
+    if let Some(warning) = &warning {
+        failure::warn(warning);
     }
     Ok(())
+}
+
+/// Warning of a fit that does not help on logs held out, or that leaves more than noise and
+/// roughness explain.
+fn warning(result: &IdentifyResult) -> Option<String> {
+    if result.gap.identified > result.gap.nominal {
+        return Some(
+            "the fitted model replays the logs held out worse than the model as given: something else differs; \
+             `asid diagnose` looks for what"
+                .into(),
+        );
+    }
+    (result.misfit > UNEXPLAINED).then(|| {
+        format!(
+            "the fitted model leaves {:.1} times the sensors' noise and its own roughness together: something else \
+             differs, and the intervals hold only as far as the model is right; `asid diagnose` looks for what",
+            result.misfit
+        )
+    })
 }
 
 /// How the range of a study's unknown of this name is widened.

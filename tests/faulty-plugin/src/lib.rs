@@ -208,6 +208,7 @@ faulty_identifiers! {
     "identifies-few-weights": |found| found.posterior.weights = vec![1.0],
     "identifies-long-samples": |found| found.posterior.samples[1].push(0.0),
     "identifies-nan-residual": |found| found.residual = f64::NAN,
+    "identifies-negative-misfit": |found| found.misfit = Some(-1.0),
 }
 
 impl Identifier for FaultyIdentifier {

@@ -5,6 +5,7 @@
 //! `equality/weld`. An attribute is written `element/name attribute`, such as `geom/arm solref`,
 //! without `/name` if the element has none, and with `default/` before it in a class of defaults.
 
+use asid_mjcf::document::is_of_higher_order;
 use mjcf_rs::Model;
 use mjcf_rs::body::GeomType;
 use roxmltree::{Document, Node};
@@ -255,7 +256,9 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
 fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec<String>) {
     for attribute in node.attributes() {
         let (name, value) = (attribute.name(), attribute.value());
-        let carried = (known.contains(&name) && !is_of_higher_order(name, value))
+        // The structure carries the linear coefficient alone.
+        let beyond = ["stiffness", "damping"].contains(&name) && is_of_higher_order(value);
+        let carried = (known.contains(&name) && !beyond)
             || LABELS.contains(&name)
             || POSE.contains(&name)
             || (element == "option" && PRECISION.contains(&name))
@@ -266,13 +269,6 @@ fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec
             found.push(labelled(element, node.attribute("name"), name));
         }
     }
-}
-
-/// Whether a stiffness or damping has more than its linear coefficient, which the structure
-/// carries.
-fn is_of_higher_order(name: &str, value: &str) -> bool {
-    let mut higher = value.split_whitespace().skip(1);
-    ["stiffness", "damping"].contains(&name) && higher.any(|x| x.parse::<f64>() != Ok(0.0))
 }
 
 /// Whether a value is MJCF's default.
