@@ -446,7 +446,7 @@ fn a_true_value_that_no_engine_takes_is_named_by_its_option() {
         said.lines()
             .last()
             .unwrap()
-            .contains("--truth mass: must be positive, not -1"),
+            .contains("--truth mass: must not be negative, as -1 is"),
         "{said}"
     );
 }
