@@ -1,9 +1,8 @@
 //! Estimates of the motion of a slide: their initial states in a model that reads otherwise, and
 //! points between two of them.
 
-use asid::core::episode::ChannelColumns;
 use asid::core::parameter::Scale;
-use asid::core::{Episode, Parameter, Scene};
+use asid::core::{Parameter, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
 use asid::diagnosis::latent_force::step_map::Derivatives;
@@ -12,6 +11,7 @@ use asid::diagnosis::machine::Machine;
 use asid::effects::EffectSpec;
 
 use super::row_slopes::largest_difference;
+use super::scatter::log_of;
 use crate::diagnosis_support::engine;
 
 /// Rows of a log, time between them and time step, s, and standard deviation of a reading, m.
@@ -36,20 +36,8 @@ fn slide() -> Machine {
 
 /// A log in which it moves otherwise than on this spring.
 fn logs(machine: &Machine) -> Logs {
-    let time: Vec<f64> = (0..ROWS).map(|k| ROW * k as f64).collect();
-    let episode = Episode {
-        readings: time.iter().map(|t| PLACE + 0.1 * (5.0 * t).sin()).collect(),
-        channels: vec![ChannelColumns {
-            name: "x".into(),
-            len: 1,
-        }],
-        time,
-        ..Episode::default()
-    };
-    let named = vec![("log".into(), episode)];
-    let mut logs = Logs::new(&machine.plant, &["x".into()], named).unwrap();
-    logs.set_noise(&[NOISE]);
-    logs
+    let time = (0..ROWS).map(|k| ROW * k as f64).collect();
+    log_of(machine, time, |t| PLACE + 0.1 * (5.0 * t).sin(), NOISE)
 }
 
 /// The log as a segment, or row by row.

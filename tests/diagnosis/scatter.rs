@@ -34,13 +34,15 @@ fn slide(joint: &str) -> Machine {
     Machine::new(engine(), &scene, &[], &[], 1).unwrap()
 }
 
-/// Its log without a stop and without noise.
-fn logs(machine: &Machine) -> Logs {
-    let [place, speed, acceleration] = START;
-    let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
-    let at = |t: &f64| place + speed * t + 0.5 * acceleration * t * t;
+/// The log of a slide that is `at` some place, m, at each time, s, read with a noise, m.
+pub(super) fn log_of(
+    machine: &Machine,
+    time: Vec<f64>,
+    at: impl Fn(f64) -> f64,
+    noise: f64,
+) -> Logs {
     let episode = Episode {
-        readings: time.iter().map(at).collect(),
+        readings: time.iter().map(|t| at(*t)).collect(),
         channels: vec![ChannelColumns {
             name: "x".into(),
             len: 1,
@@ -50,8 +52,16 @@ fn logs(machine: &Machine) -> Logs {
     };
     let named = vec![("log".into(), episode)];
     let mut logs = Logs::new(&machine.plant, &["x".into()], named).unwrap();
-    logs.set_noise(&[NOISE]);
+    logs.set_noise(&[noise]);
     logs
+}
+
+/// Its log without a stop and without noise.
+fn logs(machine: &Machine) -> Logs {
+    let [place, speed, acceleration] = START;
+    let time = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
+    let at = |t: f64| place + speed * t + 0.5 * acceleration * t * t;
+    log_of(machine, time, at, NOISE)
 }
 
 /// The log as one segment.
