@@ -88,7 +88,7 @@ pub fn expected_deviation(
         let Some(found) = episode.fit(&factor, &points, settings.assumes.tracker)? else {
             return Ok(None);
         };
-        let Some(told) = found.emulated(settings.assumes.correlated, d) else {
+        let Some(told) = found.emulated(settings.assumes.correlated) else {
             return Ok(None);
         };
         let covariance = inverse_above_prior(&(told + DMatrix::identity(n, n)));
@@ -118,7 +118,7 @@ pub fn expected_deviation(
             None
         } else {
             fit.first(episode.readings_after(h))
-                .emulated(settings.assumes.correlated, d)
+                .emulated(settings.assumes.correlated)
         };
         let prior = DMatrix::identity(n, n);
         let total = told.map_or_else(|| prior.clone(), |t| t + &prior);

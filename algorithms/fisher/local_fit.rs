@@ -20,14 +20,14 @@
 //! The scatter in `J` itself adds `2 tr(P R) (U^T U)^-1` to `H`, for steps `U`. This is subtracted
 //! from `H`; in `M` it stays, since an estimate by these slopes is subject to it
 //! ([`LocalFit::told`]). Identification by emulation omits this correction: it takes the fitted
-//! slopes at face value and divides by the largest inflation of an unknown's variance. The
+//! slopes at face value and widens every direction by its inflation ([`narrowing`]). The
 //! information that an episode is expected to give it is computed the same way
 //! ([`LocalFit::emulated`]), so that both agree.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::fisher::precision::{Precision, inflation};
+use crate::fisher::precision::{Precision, implied, inflation, narrowing};
 use crate::fisher::symmetric_eigen;
 use asid_core::rng::Rng;
 
@@ -236,25 +236,28 @@ impl LocalFit {
     }
 
     /// Information as identification by emulation computes it, entries x entries.
-    ///
-    /// The first `sought` entries are the unknowns.
     #[must_use]
-    pub fn emulated(&self, correlated: bool, sought: usize) -> Option<DMatrix<f64>> {
+    pub fn emulated(&self, correlated: bool) -> Option<DMatrix<f64>> {
         let columns = self.slopes.transpose();
-        let (precision, inflated);
+        let (precision, lower, inflated);
         if correlated {
             precision = Precision::correlated(&self.luck, self.freedom);
+            lower = implied(&precision, &columns)?;
             let [one, other] = self.halves();
             let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
                 let by = Precision::correlated(weighing, self.freedom_of(weighing));
-                inflation(&by, &columns, asked, self.freedom_of(asked), sought)
+                let factor = implied(&by, &columns)?;
+                Some(inflation(&by, &columns, asked, self.freedom_of(asked), &factor))
             };
-            inflated = 0.5 * (of(&one, &other)? + of(&other, &one)?);
+            inflated = (of(&one, &other)? + of(&other, &one)?) * 0.5;
         } else {
             precision = Precision::diagonal(&self.spread());
-            inflated = inflation(&precision, &columns, &self.luck, self.freedom, sought)?;
+            lower = implied(&precision, &columns)?;
+            inflated = inflation(&precision, &columns, &self.luck, self.freedom, &lower);
         }
-        self.outside(&(precision.weigh(&self.slopes) * columns / inflated))
+        let narrowing = narrowing(&lower, inflated)?;
+        let curvature = precision.weigh(&self.slopes) * columns;
+        self.outside(&(narrowing.transpose() * curvature * narrowing))
     }
 
     /// Variance of the roughness at each reading.

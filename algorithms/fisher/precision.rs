@@ -12,6 +12,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::fisher::symmetric_eigen;
+
 /// Share of the roughness that is treated as independent from reading to reading; see the module.
 const ALONE: f64 = 0.2;
 
@@ -64,29 +66,51 @@ impl Precision {
     }
 }
 
-/// Factor by which the variance of an unknown exceeds the one that the weights imply; the largest
-/// of all unknowns, and at least 1.
+/// Variance of an estimate over the one that the weights imply, along every direction at once.
 ///
-/// It comes from the sandwich formula at slopes `b` (readings x entries), with the roughness given
-/// by the rows of `epsilon`.
+/// `b` are the slopes (readings x entries) and the rows of `epsilon` the roughness. The weights give
+/// the curvature `H = b^T P b`, and the sandwich formula gives the covariance `H^-1 M H^-1`, with
+/// `M = b^T P (1 + R) P b`. Returned is `L^T M L`, where `L L^T = H^-1`: the covariance in coordinates
+/// in which the implied one is the identity. `lower` is `L`, of [`implied`].
 #[must_use]
 pub fn inflation(
     precision: &Precision,
     b: &DMatrix<f64>,
     epsilon: &DMatrix<f64>,
     freedom: f64,
-    sought: usize,
-) -> Option<f64> {
+    lower: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let weighed = lower.transpose() * precision.weigh(&b.transpose());
+    let projected = &weighed * epsilon.transpose();
+    &weighed * weighed.transpose() + &projected * projected.transpose() / freedom
+}
+
+/// Lower factor of `H^-1`, the covariance that weights imply at slopes `b` (readings x entries).
+#[must_use]
+pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = b.ncols();
-    let bw = precision.weigh(&b.transpose());
     // In standardised coordinates: a direction that the data do not see keeps the region's width.
-    let h = &bw * b + DMatrix::identity(n, n) * 1e-9;
-    let projected = &bw * epsilon.transpose();
-    let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;
-    let inverse = h.cholesky()?.inverse();
-    let sandwich = &inverse * middle * &inverse;
-    let inflated = (0..sought).map(|i| sandwich[(i, i)] / inverse[(i, i)]);
-    Some(inflated.fold(1.0, f64::max))
+    let h = precision.weigh(&b.transpose()) * b + DMatrix::identity(n, n) * 1e-9;
+    Some(h.cholesky()?.inverse().cholesky()?.l())
+}
+
+/// Transformation `W^-1` that gives a loss with curvature `H` the width of the sandwich formula.
+///
+/// The loss at `best + W^-1 (u - best)` has the covariance `W H^-1 W^T = H^-1 M H^-1` at `best`
+/// (curvature adjustment: Ribatet, Cooley and Davison 2012). Each direction is widened by what *its*
+/// readings scatter, so that an unknown that smooth readings determine keeps its narrow interval
+/// beside one that rough readings determine. No direction becomes narrower than the weights imply.
+#[must_use]
+pub fn narrowing(lower: &DMatrix<f64>, inflation: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let eigen = symmetric_eigen((&inflation + inflation.transpose()) * 0.5)?;
+    let axes = eigen.eigenvectors;
+    let mut narrowed = lower * &axes;
+    for (mut column, v) in narrowed.column_iter_mut().zip(&eigen.eigenvalues) {
+        column /= v.max(1.0).sqrt();
+    }
+    let n = lower.nrows();
+    let whiten = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
+    Some(narrowed * axes.transpose() * whiten)
 }
 
 fn scale_columns(x: &mut DMatrix<f64>, by: &DVector<f64>) {
@@ -112,5 +136,24 @@ mod tests {
         let spread = DVector::from_vec(vec![0.0, 3.0]);
         let weighed = Precision::diagonal(&spread).weigh(&DMatrix::from_element(1, 2, 1.0));
         assert_eq!(weighed.as_slice(), [1.0, 0.25]);
+    }
+
+    #[test]
+    fn the_narrowed_loss_has_the_covariance_of_the_sandwich() {
+        // Two entries, one shared shift of the last three readings, all inflations above 1.
+        let b = DMatrix::from_row_slice(4, 2, &[1.0, 0.2, 0.5, 0.0, 0.0, 1.0, 0.3, 2.0]);
+        let epsilon = DMatrix::from_row_slice(2, 4, &[2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0]);
+        let precision = Precision::diagonal(&DVector::from_vec(vec![0.5, 1.0, 1.0, 1.0]));
+        let lower = implied(&precision, &b).unwrap();
+        let inflated = inflation(&precision, &b, &epsilon, 1.0, &lower);
+        let back = narrowing(&lower, inflated).unwrap();
+        let p = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0 / 1.5, 0.5, 0.5, 0.5]));
+        let h = b.transpose() * &p * &b;
+        let covariance = DMatrix::identity(4, 4) + epsilon.transpose() * &epsilon;
+        let m = b.transpose() * &p * covariance * &p * &b;
+        let bread = h.clone().try_inverse().unwrap();
+        let sandwich = &bread * m * &bread;
+        let adjusted = (back.transpose() * h * back).try_inverse().unwrap();
+        assert!((&adjusted - &sandwich).norm() < 1e-6 * sandwich.norm(), "{adjusted} {sandwich}");
     }
 }

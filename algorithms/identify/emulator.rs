@@ -15,10 +15,12 @@
 //!
 //! `H^-1 B^T W (1 + R) W B H^-1`, `H = B^T W B`, `B = de/dx`, `R = cov(epsilon)`
 //!
-//! The loss is divided by the ratio of the sandwich variance to the naive one (a temperature).
+//! The loss is stretched about its minimum until its width there is the sandwich's: each direction by
+//! its own ratio ([`narrowing`]). Where the emulator does not explain the observation within noise
+//! and roughness, the loss is also divided by the mismatch (a temperature).
 //! Points are never selected by how well they fit, which would bias the result.
 
-use crate::fisher::precision::{Precision, inflation};
+use crate::fisher::precision::{Precision, implied, inflation, narrowing};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 
@@ -37,7 +39,11 @@ pub struct Emulator {
     region: Gaussian,
     /// `A^T W A`, features x features.
     gram: DMatrix<f64>,
-    /// Factor on the loss: the inverse of variance inflation times mismatch.
+    /// Best point within reach, standardised.
+    best: DVector<f64>,
+    /// Transformation of steps from the best point that makes the loss as wide as the sandwich.
+    narrowing: DMatrix<f64>,
+    /// Factor on the loss: the inverse of the mismatch.
     temperature: f64,
     /// Root mean square of the emulated whitened residual at its best point.
     pub residual: f64,
@@ -84,15 +90,13 @@ fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
 impl Emulator {
     /// Fits the residuals of points in a region; `None` where there are too few points.
     ///
-    /// The first `sought` entries are unknowns, the others start poses. `readings` is the number of
-    /// residual entries that are present. Readings are weighted by the variance of their roughness
+    /// `readings` is the number of residual entries that are present. Readings are weighted by the variance of their roughness
     /// or, if `correlated`, by its whole covariance along the episode.
     #[must_use]
     pub fn fit(
         region: &Gaussian,
         points: &[&[f64]],
         residuals: &[&[f64]],
-        sought: usize,
         readings: usize,
         correlated: bool,
     ) -> Option<Self> {
@@ -124,6 +128,8 @@ impl Emulator {
         let mut emulator = Self {
             region: region.clone(),
             gram,
+            best: DVector::zeros(n),
+            narrowing: DMatrix::identity(n, n),
             temperature: 1.0,
             residual: 0.0,
             roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
@@ -144,7 +150,8 @@ impl Emulator {
                 .collect();
             move |i, k| slopes[k][i]
         });
-        let inflation = if correlated {
+        let lower = implied(&precision, &b)?;
+        let inflated = if correlated {
             // A sample covariance cannot be tested on the points that it was computed from: each
             // half is evaluated with the covariance of the other.
             let share = freedom / count as f64;
@@ -154,14 +161,17 @@ impl Emulator {
             };
             let halves = [half(0), half(1)];
             let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
-                let precision = Precision::correlated(weighing, share * weighing.nrows() as f64);
-                inflation(&precision, &b, asked, share * asked.nrows() as f64, sought)
+                let by = Precision::correlated(weighing, share * weighing.nrows() as f64);
+                let freedom = share * asked.nrows() as f64;
+                Some(inflation(&by, &b, asked, freedom, &implied(&by, &b)?))
             };
-            0.5 * (of(&halves[0], &halves[1])? + of(&halves[1], &halves[0])?)
+            (of(&halves[0], &halves[1])? + of(&halves[1], &halves[0])?) * 0.5
         } else {
-            inflation(&precision, &b, &epsilon, freedom, sought)?
+            inflation(&precision, &b, &epsilon, freedom, &lower)
         };
-        emulator.temperature = 1.0 / (inflation * mismatch.max(1.0));
+        emulator.narrowing = narrowing(&lower, inflated)?;
+        emulator.best = DVector::from_vec(best);
+        emulator.temperature = 1.0 / mismatch.max(1.0);
         Some(emulator)
     }
 
@@ -170,10 +180,17 @@ impl Emulator {
         0.5 * phi.dot(&(&self.gram * &phi))
     }
 
-    /// Tempered loss at a point of the search space.
+    /// Loss at a point of the search space, as wide as the sandwich and tempered.
     #[must_use]
     pub fn loss(&self, x: &[f64]) -> f64 {
-        self.temperature * self.loss_at(&self.region.standardise(x))
+        self.widened(&self.region.standardise(x))
+    }
+
+    /// [`loss`](Self::loss) at a standardised point.
+    fn widened(&self, u: &[f64]) -> f64 {
+        let step = DVector::from_column_slice(u) - &self.best;
+        let nearer = &self.best + &self.narrowing * step;
+        self.temperature * self.loss_at(nearer.as_slice())
     }
 
     /// The best point within reach, in standardised coordinates, by damped Newton steps.
@@ -213,8 +230,7 @@ impl Emulator {
     /// The best point of the search space.
     #[must_use]
     pub fn best(&self) -> Vec<f64> {
-        self.region
-            .unstandardise(&self.minimum(self.region.mean().len()))
+        self.region.unstandardise(self.best.as_slice())
     }
 
     /// Draws `count` equally weighted points of the posterior by a Metropolis walk.
@@ -230,7 +246,7 @@ impl Emulator {
                     .zip(high)
                     .all(|((x, l), h)| x >= l && x <= h)
         };
-        let mut u = self.minimum(n);
+        let mut u = self.best.as_slice().to_vec();
         if !inside(&u) {
             let x: Vec<f64> = self
                 .region
@@ -246,9 +262,9 @@ impl Emulator {
         let slopes: Vec<DVector<f64>> = (0..n)
             .map(|k| DVector::from_vec(feature_slope(&u, k)))
             .collect();
-        let curvature = DMatrix::from_fn(n, n, |i, j| {
-            self.temperature * slopes[i].dot(&(&self.gram * &slopes[j]))
-        }) + DMatrix::identity(n, n) * REACH.powi(-2);
+        let h = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.gram * &slopes[j])));
+        let curvature = self.narrowing.transpose() * h * &self.narrowing * self.temperature
+            + DMatrix::identity(n, n) * REACH.powi(-2);
         let Some(factor) = curvature
             .cholesky()
             .map(|c| c.inverse())
@@ -259,7 +275,7 @@ impl Emulator {
         let walk = Walk {
             shape: factor.l(),
             inside: &inside,
-            loss: &|u: &[f64]| self.temperature * self.loss_at(u),
+            loss: &|u: &[f64]| self.widened(u),
         };
         let drawn = walk.draws(&u, count, rng);
         drawn.iter().map(|u| self.region.unstandardise(u)).collect()
@@ -306,7 +322,7 @@ mod tests {
             .collect();
         let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-        let emulator = Emulator::fit(&region, &p, &r, 1, m, correlated).unwrap();
+        let emulator = Emulator::fit(&region, &p, &r, m, correlated).unwrap();
         let mut walk = Streams::new(seed).stream("w");
         let samples = emulator.sample(&[-9.0], &[9.0], 1000, &mut walk);
         let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 1000.0;
@@ -369,7 +385,7 @@ mod tests {
         let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
         let [alone, together] = [false, true].map(|correlated| {
-            let emulator = Emulator::fit(&region, &p, &r, 1, m, correlated).unwrap();
+            let emulator = Emulator::fit(&region, &p, &r, m, correlated).unwrap();
             let mut walk = Streams::new(3).stream("w");
             let samples = emulator.sample(&[-9.0], &[9.0], 2000, &mut walk);
             let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 2000.0;
@@ -380,6 +396,45 @@ mod tests {
         assert!(alone > 0.4, "{alone}");
         // A fifth of the roughness is treated as independent: sqrt(1 + 0.2 * 9) * 0.141.
         assert!(together < 0.27, "{together}");
+    }
+
+    #[test]
+    fn each_unknown_is_as_wide_as_its_own_readings_scatter() {
+        // `a` moves readings 1 to 100, which are smooth, and `b` readings 101 to 200, which a shift
+        // of 0.6 moves together. Slopes are 0.5: `a` has a standard deviation of 1 / (0.5 sqrt 100)
+        // = 0.2 and `b` of sqrt(0.2^2 + (0.6 / 0.5)^2) = 1.2.
+        let (m, slope, rough) = (200, 0.5, 0.6);
+        let region = Gaussian::diagonal(&[0.0; 2], &[1.0; 2], &[-9.0; 2], &[9.0; 2]);
+        let mut rng = Streams::new(4).stream("e");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let observed: Vec<f64> = (0..m).map(|_| normal()).collect();
+        let mut draws = Streams::new(4).stream("d");
+        let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+        let residuals: Vec<Vec<f64>> = points
+            .iter()
+            .map(|x| {
+                let luck = rough * normal();
+                let simulated = |k: usize| {
+                    if k < m / 2 {
+                        slope * x[0]
+                    } else {
+                        slope * x[1] + luck
+                    }
+                };
+                (0..m).map(|k| simulated(k) - observed[k]).collect()
+            })
+            .collect();
+        let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+        let mut walk = Streams::new(4).stream("w");
+        let samples = emulator.sample(&[-9.0; 2], &[9.0; 2], 2000, &mut walk);
+        let std = |i: usize| {
+            let mean = samples.iter().map(|s| s[i]).sum::<f64>() / 2000.0;
+            (samples.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>() / 2000.0).sqrt()
+        };
+        assert!((std(0) / 0.2 - 1.0).abs() < 0.3, "{}", std(0));
+        assert!(std(1) > 0.9, "{}", std(1));
     }
 
     #[test]

@@ -226,7 +226,6 @@ pub fn posterior(
             &region,
             &points,
             &residuals,
-            d,
             present,
             settings.correlated,
         )

@@ -227,7 +227,7 @@ mod tests {
             .collect();
         let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-        Emulator::fit(&region, &p, &r, 1, m, false).unwrap()
+        Emulator::fit(&region, &p, &r, m, false).unwrap()
     }
 
     /// Symptom: a search that had found the truth of a rough simulator restarted, and

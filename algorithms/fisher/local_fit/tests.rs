@@ -54,7 +54,7 @@ fn a_quadratic_is_fitted_exactly() {
         let told = fit.told(correlated).unwrap();
         let error = told.information - &wanted * wanted.transpose();
         assert!(error.norm() < 1e-6, "{error}");
-        let emulated = fit.emulated(correlated, 2).unwrap();
+        let emulated = fit.emulated(correlated).unwrap();
         assert!((emulated - &wanted * wanted.transpose()).norm() < 1e-6);
     }
 }
