@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::method::{NONE, TRUTH};
 use crate::number;
 
 /// Key that identifies a cell.
@@ -147,6 +148,21 @@ pub struct Cell {
     pub physics_steps: u64,
     /// Control steps of exploration episodes that the method simulated.
     pub env_steps: u64,
+}
+
+impl Cell {
+    /// Whether its method identified the unknowns from an episode.
+    #[must_use]
+    pub fn identifies(&self) -> bool {
+        ![NONE, TRUTH].contains(&&*self.identifier)
+    }
+
+    /// Whether both are of the same bytes as files; a number that is missing (NaN) equals another.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        let written = |cell: &Self| serde_json::to_value(cell).ok();
+        written(self) == written(other)
+    }
 }
 
 /// Layout version of a cell.

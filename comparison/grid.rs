@@ -5,7 +5,7 @@
 pub struct Entry {
     /// Text.
     pub text: String,
-    /// Whether it is the best of its column, with an interval apart from the next one's.
+    /// Whether it is the best of its column, with an interval apart from the others'.
     pub best: bool,
 }
 

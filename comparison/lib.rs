@@ -11,6 +11,7 @@
 //! Markdown, and [`paper`] holds the published values for comparison.
 
 pub mod cell;
+mod contents;
 pub mod document;
 pub mod grid;
 pub mod merge;

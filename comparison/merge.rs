@@ -97,7 +97,7 @@ pub fn unite(parts: &[Part], commits: Commits) -> Result<Merged> {
                 cells.push((cell.clone(), part));
                 continue;
             };
-            if same != cell {
+            if !same.is_same(cell) {
                 return Err(refuse(format!(
                     "has another outcome than {} for one run: {}",
                     name(whose),
@@ -198,15 +198,16 @@ mod tests {
         document.plan.check().unwrap();
         crate::store::write(&store.config(), &document.text().unwrap()).unwrap();
         for &seed in seeds {
+            // Its parameters hold NaN.
             let mut made = cell(key("a", "x", "asid", seed), seed as f64, true);
-            // Without parameters the cell equals itself; they may hold NaN.
-            made.parameters.clear();
             change(&mut made);
             store.keep(&made, None).unwrap();
         }
         Part::read(folder).unwrap()
     }
 
+    /// Symptom: a merge of two folders with one run in common, of which a number was missing, found
+    /// two outcomes of that run. Cause: NaN is not equal to NaN.
     #[test]
     fn parts_make_a_whole_and_equal_cells_count_once() {
         let folder = tempfile::tempdir().unwrap();

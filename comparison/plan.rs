@@ -49,11 +49,15 @@ pub const MATCHED: &str = "matched";
 /// The world that differs from the simulator as a real one would; tables show it first.
 pub const PERTURBED: &str = "perturbed";
 
+/// Most runs of a plan: far more than are ever made, and few enough to be listed in memory, at some
+/// 200 bytes each.
+const MOST: u64 = 1_000_000;
+
 impl Plan {
     /// Removes repeated entries and puts the perturbed world first.
     ///
     /// # Errors
-    /// When there is nothing to run, seeds overflow, or two methods share a name.
+    /// When there is nothing to run or far too much, seeds overflow, or two methods share a name.
     pub fn check(&mut self) -> Result<()> {
         let wrong = |key: &str, message: &str| {
             Err(Error::Config {
@@ -88,10 +92,34 @@ impl Plan {
                 );
             }
         }
+        if self.runs().is_none_or(|runs| runs > MOST) {
+            let last = self.first_seed + (self.seeds - 1);
+            let message = format!(
+                "the seeds {} to {last} make more than {MOST} runs; name fewer, and merge only \
+                 comparisons whose seeds lie near each other",
+                self.first_seed
+            );
+            return wrong("--seeds", &message);
+        }
         if self.cells().is_empty() {
             return Err(Error::Failed("there is nothing to compare".into()));
         }
         Ok(())
+    }
+
+    /// Number of cells; `None` where 64 bits do not hold it.
+    fn runs(&self) -> Option<u64> {
+        let conditions: usize = self.task.iter().map(|t| t.conditions.len()).sum();
+        let parts = [
+            conditions,
+            self.backends.len(),
+            self.worlds.len(),
+            self.methods.len(),
+        ];
+        let of = |part: usize| u64::try_from(part).ok();
+        parts
+            .into_iter()
+            .try_fold(self.seeds, |product, part| product.checked_mul(of(part)?))
     }
 
     /// The cells in the order of the tables; seeds are innermost.
@@ -234,6 +262,25 @@ pub(crate) mod tests {
         other.methods.pop();
         other.quick = true;
         assert!(a.union(&other).unwrap_err().to_string().contains("quick"));
+    }
+
+    /// Symptom: a merge of comparisons of the seeds 0 and 20250101 ended for want of memory. Cause:
+    /// the smallest plan with both has all seeds between them.
+    #[test]
+    fn plans_whose_seeds_lie_far_apart_are_not_united() {
+        let mut a = plan();
+        a.check().unwrap();
+        assert_eq!(a.runs(), Some(a.cells().len() as u64));
+        let mut b = a.clone();
+        b.first_seed = 20_250_101;
+        let said = a.union(&b).unwrap_err().to_string();
+        assert!(
+            said.contains("--seeds") && said.contains("5 to 20250103"),
+            "{said}"
+        );
+        let mut many = plan();
+        many.seeds = u64::MAX - many.first_seed;
+        assert!(many.check().is_err());
     }
 
     #[test]

@@ -126,7 +126,7 @@ fn fill(row: &mut Row, cells: &[&Cell]) {
     row.seeds = cells.iter().map(|c| c.key.seed).collect();
     row.values = cells.iter().map(|c| c.value).collect();
     // Without identification only the prior is known about the unknowns.
-    if cells[0].residual.is_some() {
+    if cells[0].identifies() {
         row.identification = (0..cells[0].parameters.len())
             .map(|i| identification(cells, i))
             .collect();

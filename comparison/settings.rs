@@ -3,14 +3,13 @@
 //! The hash is SHA-256 over canonical TOML with sorted keys and all defaults. It leaves out what
 //! may differ among the runs of a row (seed and condition) and what the method does not use (for
 //! example the explorer of a method that does not explore). A file that a setting names enters by
-//! its content and not by its path, so a comparison has the same hashes in every folder. So do the
-//! models that a refined model is of.
+//! its content and not by its path, so a comparison has the same hashes in every folder. So does
+//! what a model consists of.
 
 use std::path::Path;
 
-use asid_documents::toml_text;
-use sha2::{Digest, Sha256};
-
+use crate::contents::{DIGITS, of_file, of_model};
+pub use crate::contents::{PLUGIN_HASH, digest};
 use crate::method::{Method, NONE, TRUTH};
 
 /// Top-level keys in which the runs of a row differ.
@@ -24,17 +23,8 @@ const FILES: [(&str, &str); 4] = [
     ("identifier", "network"),
 ];
 
-/// The key among [`FILES`] whose file may name another model.
+/// The key among [`FILES`] whose file is a model.
 const MODEL: &str = "model";
-
-/// Longest chain of refined models of refined models that is followed: as many as can be opened.
-const MAX_DEPTH: usize = 8;
-
-/// Text between the path of a recorded plugin and its SHA-256.
-pub const PLUGIN_HASH: &str = "#sha256=";
-
-/// Length of a hash in hexadecimal digits: 64 bits distinguish all settings that a person makes.
-const DIGITS: usize = 16;
 
 /// Reduces resolved settings of a run to those that identify a row's settings.
 #[must_use]
@@ -96,37 +86,6 @@ fn named(name: &str) -> toml::Value {
     section.into()
 }
 
-/// Hash of a file as `sha256:…`; `None` where it cannot be read.
-fn of_file(path: &Path) -> Option<String> {
-    let bytes = std::fs::read(path).ok()?;
-    Some(format!("sha256:{}", digest(&bytes)))
-}
-
-/// Hash of a model's file; that of a refined model covers the model it refines.
-fn of_model(path: &Path) -> Option<String> {
-    of_chain(path, MAX_DEPTH)
-}
-
-/// As [`of_model`], at most `depth` refined models deep.
-fn of_chain(path: &Path, depth: usize) -> Option<String> {
-    if path.extension().is_none_or(|e| e != "toml") {
-        return of_file(path);
-    }
-    let text = std::fs::read_to_string(path).ok()?;
-    let Ok(mut table) = toml_text::read::<toml::Table>(&text) else {
-        return of_file(path);
-    };
-    if let Some(toml::Value::String(model)) = table.get_mut(MODEL)
-        && depth > 0
-    {
-        let named = path.parent().unwrap_or(Path::new("")).join(&*model);
-        if let Some(contents) = of_chain(&named, depth - 1) {
-            *model = contents;
-        }
-    }
-    Some(format!("sha256:{}", digest(table.to_string().as_bytes())))
-}
-
 /// Hash of a plugin: the recorded one, which its path ends with, else that of its file.
 fn of_plugin(path: &Path) -> Option<String> {
     let text = path.to_str()?;
@@ -145,16 +104,6 @@ pub fn hash(canonical: &toml::Table) -> (String, String) {
     // A table of this crate keeps its keys sorted.
     let text = canonical.to_string();
     (digest(text.as_bytes()), text)
-}
-
-/// The first `DIGITS` hexadecimal digits of SHA-256.
-#[must_use]
-pub fn digest(bytes: &[u8]) -> String {
-    let all: String = Sha256::digest(bytes)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    all[..DIGITS].to_owned()
 }
 
 /// Entries that differ: dotted key and both values; `-` for a missing one.
@@ -259,6 +208,52 @@ mod tests {
         // A circle ends.
         std::fs::write(a.path().join("a.toml"), "model = 'b.toml'").unwrap();
         assert!(of_model(&a.path().join("a.toml")).is_some());
+    }
+
+    /// Symptom: after an edit of a file that a model includes, a row pooled runs of two simulators.
+    /// Cause: only the model's own file was hashed.
+    #[test]
+    fn a_model_counts_by_what_it_includes_and_loads() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        };
+        let of = |name: &str| of_model(&folder.path().join(name)).unwrap();
+        let include = "<include file='arm.xml'/>";
+        let mesh = "<asset><mesh name='a' file='a.stl'/></asset>";
+        let model = format!("<mujoco><compiler meshdir='meshes'/>{include}{mesh}</mujoco>");
+        file("model.xml", &model);
+        let change = |name: &str, text: &str| {
+            let before = of("model.xml");
+            file(name, text);
+            before != of("model.xml")
+        };
+        file("arm.xml", "<mujoco><worldbody/></mujoco>");
+        file("meshes/a.stl", "a mesh");
+        assert!(!change("arm.xml", "<mujoco><worldbody/></mujoco>"));
+        assert!(change(
+            "arm.xml",
+            "<mujoco><option timestep='0.001'/></mujoco>"
+        ));
+        assert!(change("meshes/a.stl", "another mesh"));
+        assert!(!change("meshes/b.stl", "a mesh that is not named"));
+        // A model in one file has the hash of the file.
+        file("plain.xml", "<mujoco/>");
+        assert_eq!(of("plain.xml"), format!("sha256:{}", digest(b"<mujoco/>")));
+        // An attached model counts as well; a circle of them ends.
+        file(
+            "b.xml",
+            "<mujoco><asset><model name='c' file='c.xml'/></asset></mujoco>",
+        );
+        file(
+            "c.xml",
+            "<mujoco><asset><model name='b' file='b.xml'/></asset></mujoco>",
+        );
+        let before = of("b.xml");
+        file("c.xml", "<mujoco/>");
+        assert_ne!(before, of("b.xml"));
     }
 
     /// Symptom: one plugin in two folders gave two hashes. Cause: its record, path and SHA-256, was

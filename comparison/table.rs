@@ -11,7 +11,7 @@ use crate::rows::{ComparisonResult, Omitted, Row, Summary};
 
 /// Explanation of the main table's columns.
 const MAIN: &str = "Lower is better. IQM: interquartile mean of the metric over seeds with its 95 % bootstrap interval; \
-    success with its 95 % Wilson interval; in bold the best of a condition where its interval is apart from the next method's (of the metric: from six runs on). \
+    success with its 95 % Wilson interval; in bold the best of a condition where its interval is apart from every other method's (of the metric: from six runs of each on). \
     P(better): probability that a run is better than one of the method named, ties counting half. The oracle is told the truth \
     and is ranked with nobody. ";
 
@@ -187,7 +187,7 @@ fn main(plan: &Plan, result: &ComparisonResult) -> Grid {
                 None => cells.extend([Entry::default(), Entry::default(), Entry::default()]),
             }
         }
-        cells.push(published(first).into());
+        cells.push(published(&line).into());
         let mut differs: Vec<&str> = line.iter().flat_map(|r| &r.differs).map(|d| &**d).collect();
         differs.dedup();
         cells.push(differs.join("; ").into());
@@ -197,10 +197,16 @@ fn main(plan: &Plan, result: &ComparisonResult) -> Grid {
     grid
 }
 
-fn published(row: &Row) -> String {
-    row.published.map_or(String::new(), |p| {
-        format!("{} (Table {})", p.words(), p.table)
-    })
+/// The paper's values for the rows of a line, which may be of several worlds.
+fn published(line: &[&Row]) -> String {
+    let mut told: Vec<String> = Vec::new();
+    for p in line.iter().filter_map(|r| r.published) {
+        let value = format!("{} (Table {})", p.words(), p.table);
+        if !told.contains(&value) {
+            told.push(value);
+        }
+    }
+    told.join("; ")
 }
 
 /// Table of the methods pooled over all conditions of a task.
@@ -319,6 +325,7 @@ mod tests {
     use super::*;
     use crate::cell::tests::{cell, key};
     use crate::cell::{Cell, Failure};
+    use crate::paper::STAND_IN;
     use crate::plan::tests::plan;
     use crate::plan::{PERTURBED, TaskPlan};
     use crate::rows::summarise;
@@ -387,6 +394,24 @@ mod tests {
         // Nothing is missing.
         let (plan, all) = example();
         assert!(notes(&plan, &all).is_empty());
+    }
+
+    /// Symptom: the paper's value was missing beside a world that it has one for. Cause: only the
+    /// first of the worlds side by side was asked.
+    #[test]
+    fn the_papers_values_of_all_worlds_side_by_side_are_told() {
+        let mut plan = plan();
+        plan.worlds = vec![PERTURBED.into(), STAND_IN.into()];
+        plan.task = vec![TaskPlan {
+            name: "shuffleboard".into(),
+            conditions: vec!["near".into()],
+        }];
+        plan.check().unwrap();
+        let cells = plan.cells().into_iter().map(|k| cell(k, 0.5, true));
+        let result = summarise(&plan, &cells.collect::<Vec<_>>(), &[], &|_| None);
+        let text = markdown(&plan, &result);
+        let line = text.lines().find(|l| l.contains("| asid |")).unwrap();
+        assert!(line.contains("4/5 (Table 3)"), "{line}");
     }
 
     #[test]

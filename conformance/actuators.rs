@@ -43,6 +43,14 @@ pub const CHECKS: &[Check] = &[
         measure: Figure(sag),
     },
     Check {
+        name: "actuators/gains-of-a-class",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: Tolerance::same(0.01),
+        reason: "kp and kv from the element, its class and the class around that make the response of servo-step-response: first order, w dt / 2 of the step",
+        measure: Figure(class_gains),
+    },
+    Check {
         name: "actuators/force-limit",
         needs: DRIVEN,
         unit: "",
@@ -103,16 +111,50 @@ fn wheel(backend: &dyn Backend, actuator: &str) -> Result<Rig> {
     Rig::new(backend, &inside, &["qpos.j", "qvel.j"])
 }
 
-fn step_response(backend: &dyn Backend) -> Result<f64> {
-    // 0.1 q'' + 1 q' + 10 q = 10: a damping ratio of a half.
-    let mut rig = wheel(backend, r#"<position joint="j" kp="10" kv="1"/>"#)?;
-    let rows = rig.run(500, &[1.0])?;
+/// Three wheels of 0.1 kg m² on the hinges a, b and c.
+fn wheels() -> String {
+    let wheel = |name: &&str| {
+        format!(
+            r#"<body><joint name="{name}" axis="0 0 1"/>
+            <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>"#
+        )
+    };
+    ["a", "b", "c"].iter().map(wheel).collect()
+}
+
+/// What is left of a step after some frames, by 0.1 q'' + 1 q' + 10 q = 10.
+fn left(frames: usize) -> f64 {
     let (omega, zeta) = (10.0, 0.5f64);
     let damped = omega * (1.0 - zeta * zeta).sqrt();
-    Ok(largest(rows.iter().enumerate().map(|(i, row)| {
-        let t = (i + 1) as f64 * STEP;
-        let (sin, cos) = (damped * t).sin_cos();
-        row[0] - 1.0 + (-zeta * omega * t).exp() * (cos + zeta * omega / damped * sin)
+    let t = frames as f64 * STEP;
+    let (sin, cos) = (damped * t).sin_cos();
+    (-zeta * omega * t).exp() * (cos + zeta * omega / damped * sin)
+}
+
+fn step_response(backend: &dyn Backend) -> Result<f64> {
+    let mut rig = wheel(backend, r#"<position joint="j" kp="10" kv="1"/>"#)?;
+    let rows = rig.run(500, &[1.0])?;
+    let rows = rows.iter().enumerate();
+    Ok(largest(rows.map(|(i, row)| row[0] - 1.0 + left(i + 1))))
+}
+
+/// The same servo three times, whose gains a document states in other places.
+fn class_gains(backend: &dyn Backend) -> Result<f64> {
+    let inside = format!(
+        r#"<option gravity="0 0 0" integrator="implicitfast"/>
+        <default><position kp="4" kv="1"/>
+          <default class="stiff"><position kp="10"/></default>
+          <default class="damped"><position kp="10" kv="7"/></default></default>
+        <worldbody>{}</worldbody>
+        <actuator><position joint="a" kp="10"/><position joint="b" class="stiff"/>
+          <position joint="c" class="damped" kv="1"/></actuator>"#,
+        wheels()
+    );
+    let mut rig = Rig::new(backend, &inside, &["qpos.a", "qpos.b", "qpos.c"])?;
+    let rows = rig.run(250, &[1.0; 3])?;
+    let all = rows.iter().enumerate();
+    Ok(largest(all.flat_map(|(i, row)| {
+        row.iter().map(move |angle| angle - 1.0 + left(i + 1))
     })))
 }
 
@@ -192,19 +234,11 @@ fn servo_gear(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn own_joint(backend: &dyn Backend) -> Result<f64> {
-    // Three wheels; their motors come in another order.
-    let wheels: String = ["a", "b", "c"]
-        .iter()
-        .map(|name| {
-            format!(
-                r#"<body><joint name="{name}" axis="0 0 1"/>
-                <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>"#
-            )
-        })
-        .collect();
+    // The motors come in another order than their wheels.
     let inside = format!(
-        r#"<option gravity="0 0 0"/><worldbody>{wheels}</worldbody>
-        <actuator><motor name="mc" joint="c"/><motor name="ma" joint="a"/><motor name="mb" joint="b"/></actuator>"#
+        r#"<option gravity="0 0 0"/><worldbody>{}</worldbody>
+        <actuator><motor name="mc" joint="c"/><motor name="ma" joint="a"/><motor name="mb" joint="b"/></actuator>"#,
+        wheels()
     );
     let mut rig = Rig::new(backend, &inside, &["qvel.a", "qvel.b", "qvel.c"])?;
     let rows = rig.run(50, &[1.0, 2.0, 3.0])?;

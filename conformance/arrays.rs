@@ -27,7 +27,7 @@ pub const CHECKS: &[Check] = &[
         needs: ANY,
         unit: "",
         tolerance: EXACT,
-        reason: "positions and velocities of the first <key>: rounding",
+        reason: "positions and velocities of the first <key>, its quaternions at length one: rounding",
         measure: Figure(crate::layout::keyframe),
     },
     Check {

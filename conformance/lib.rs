@@ -37,8 +37,9 @@
 //! nothing that moves. It also fails if no check can test a claimed bit without bits that it does
 //! not claim.
 //!
-//! Snapshots, determinism, invalid calls, divergence and the rules of parameters are checked on
-//! every engine, in a scene made of what it claims.
+//! Determinism, invalid calls, divergence and the rules of parameters are checked on every engine,
+//! in a scene made of what it claims. An engine that does not claim `EXACT_SNAPSHOT` is never asked
+//! to save, restore or copy a state.
 //!
 //! ```no_run
 //! # fn main() -> asid_core::Result<()> {

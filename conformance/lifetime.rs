@@ -35,7 +35,7 @@ pub const CHECKS: &[Check] = &[
     ),
     check(
         "state/snapshot-of-another-scene",
-        ANY,
+        EXACT,
         "an error each, for another document, the same with other masses, and data of another engine: accepted of three",
         foreign,
     ),

@@ -31,6 +31,18 @@ pub fn parts(capabilities: Capabilities) -> Vec<Part> {
             wheel("frictionloss of a hinge", r#"frictionloss="0.2""#, ""),
             wheel("range of a hinge", r#"range="-0.1 0.1""#, ""),
             wheel("<motor>", "", motor),
+            driven("damping of a <motor>", r#"damping="0.2""#, ""),
+            driven("armature of a <motor>", r#"armature="0.2""#, ""),
+            driven(
+                "<option actuatorgroupdisable>",
+                "",
+                r#"<option actuatorgroupdisable="0"/>"#,
+            ),
+            grouped(
+                "of a hinge",
+                r#"<joint name="j" axis="0 1 0"/>"#,
+                (vec![0.3], vec![0.0]),
+            ),
             wheel("<equality><joint>", "", lock),
             wheel("<equality><weld>", "", WELD),
         ]);
@@ -53,6 +65,7 @@ pub fn parts(capabilities: Capabilities) -> Vec<Part> {
             vec![0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0],
             vec![0.5, 0.0, -3.0, 0.3, 0.2, 0.1],
         );
+        parts.push(grouped("of a free body", free, state.clone()));
         parts.extend(falls("of a free body", free, state));
     }
     parts
@@ -77,6 +90,42 @@ fn wheel(name: &str, joint: &str, beside: &str) -> Part {
         state: Some((vec![0.0], vec![2.0])),
         with: document(joint, beside),
         without: document(if joint.contains("armature") { rest } else { "" }, ""),
+    }
+}
+
+/// A wheel with a motor, with an attribute of the motor or an element beside it.
+fn driven(name: &str, motor: &str, beside: &str) -> Part {
+    let document = |motor: &str, beside: &str| {
+        format!(
+            r#"<option gravity="0 0 0"/>{beside}<worldbody><body name="b"><joint name="j" axis="0 0 1"/>
+            <inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>
+            <actuator><motor joint="j" {motor}/></actuator>"#
+        )
+    };
+    Part {
+        name: name.to_owned(),
+        channel: "qpos.j",
+        state: Some((vec![0.0], vec![2.0])),
+        with: document(motor, beside),
+        without: document("", ""),
+    }
+}
+
+/// A body of two balls, of which the groups that have mass may leave one out.
+fn grouped(whose: &str, joint: &str, state: (Vec<f64>, Vec<f64>)) -> Part {
+    let document = |compiler: &str| {
+        format!(
+            r#"{compiler}<worldbody><body name="b">{joint}
+            <geom type="sphere" size=".05" pos=".2 0 0" mass="1"{GHOST}/>
+            <geom type="sphere" size=".05" pos="0 .1 .3" mass="1" group="2"{GHOST}/></body></worldbody>"#
+        )
+    };
+    Part {
+        name: format!("<compiler inertiagrouprange> {whose}"),
+        channel: "qpos.j",
+        state: Some(state),
+        with: document(r#"<compiler inertiagrouprange="0 0"/>"#),
+        without: document(""),
     }
 }
 

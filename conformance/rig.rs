@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use asid_core::simulator::{ExternalForce, ParameterChange, StepHook};
 use asid_core::{
-    Backend, BatchConfig, Control, Error, Layout, Model, Recording, Result, Rollout, Scene,
-    Simulator, Target,
+    Backend, BatchConfig, Capabilities, Control, Error, Layout, Model, Recording, Result, Rollout,
+    Scene, Simulator, Target,
 };
 
 /// Standard gravity of the scenes, m/s².
@@ -23,6 +23,12 @@ pub fn scene(inside: &str) -> Result<Scene> {
         "<mujoco><compiler angle=\"radian\"/><option timestep=\"{STEP}\"/>{inside}</mujoco>"
     );
     Scene::from_xml("conformance", &xml, &[])
+}
+
+/// Whether an engine claims to save states. One that does not is never asked to save, restore or
+/// copy any.
+pub fn saves(backend: &dyn Backend) -> bool {
+    (backend.capabilities()).contains(Capabilities::EXACT_SNAPSHOT)
 }
 
 /// The make-up of a rig besides its scene.

@@ -122,12 +122,24 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
     }
     // A measured speed is better than a difference.
     for (i, sensor) in layout.sensors.iter().enumerate() {
-        if let (Reads::Joint(j), "jointvel" | "ballangvel") = (plant.sensors[i], &*sensor.kind)
-            && let Some((first, ..)) = seen(&sensor.name)
-        {
-            let place = layout.joints[j].qvel;
-            qvel[place..place + first.len()].copy_from_slice(&first);
+        let joint = match (plant.sensors[i], &*sensor.kind) {
+            (Reads::Joint(j), "jointvel" | "ballangvel") => Some(j),
+            (Reads::Body(b), "framelinvel" | "frameangvel") => plant.free_joint(b),
+            _ => None,
+        };
+        let Some((joint, (mut first, ..))) = joint.zip(seen(&sensor.name)) else {
+            continue;
+        };
+        let joint = &layout.joints[joint];
+        let mut place = joint.qvel;
+        if sensor.kind == "frameangvel" {
+            // About the axes of the world.
+            let turn = unit_quaternion(&qpos[joint.qpos + 3..joint.qpos + 7]);
+            let own = turn.inverse() * nalgebra::Vector3::from_column_slice(&first);
+            first.copy_from_slice(own.as_slice());
+            place += 3;
         }
+        qvel[place..place + first.len()].copy_from_slice(&first);
     }
 }
 
@@ -226,5 +238,37 @@ mod tests {
         assert!(is_near(&found.qvel, spin.as_slice()), "{:?}", found.qvel);
         let found = given_start(&plant, &log("spin", &|_| vec![1.0, 2.0, 3.0]));
         assert_eq!(found.qvel, [1.0, 2.0, 3.0]);
+    }
+
+    /// Symptom: replays of a thrown body began without the spin that a sensor reads. Cause: speeds
+    /// were read of joints alone.
+    #[test]
+    fn a_free_body_begins_with_the_speeds_that_its_sensors_read() {
+        let scene = r#"<mujoco><worldbody>
+            <body name="b"><freejoint name="b"/><geom size="0.05" mass="1"/></body></worldbody>
+            <sensor><frameangvel name="spin" objtype="xbody" objname="b"/>
+            <framelinvel name="speed" objtype="xbody" objname="b"/>
+            <framequat name="turn" objtype="xbody" objname="b"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("thrown", scene, &[]).unwrap()).unwrap();
+        // A quarter turn about z: the body's own x is the world's y.
+        let side = UnitQuaternion::from_scaled_axis(Vector3::z() * std::f64::consts::FRAC_PI_2);
+        let turn = [side.w, side.i, side.j, side.k];
+        let row = [&[7.0, 2.0, 3.0, -1.0, 0.5, 4.0][..], &turn].concat();
+        let channel = |(name, len): (&str, usize)| ChannelColumns {
+            name: name.into(),
+            len,
+        };
+        let channels = [("spin", 3), ("speed", 3), ("turn", 4)];
+        let episode = Episode {
+            time: vec![0.0, 0.01],
+            channels: channels.map(channel).into(),
+            readings: row.repeat(2),
+            ..Episode::default()
+        };
+        let found = given_start(&plant, &episode);
+        let want = [-1.0, 0.5, 4.0, 2.0, -7.0, 3.0];
+        for (got, want) in found.qvel.iter().zip(want) {
+            assert!((got - want).abs() < 1e-12, "{:?}", found.qvel);
+        }
     }
 }

@@ -229,6 +229,8 @@ pub trait Effect: Send + Sync {
     /// The limit of the force of the drive at its site that it sets with some values.
     ///
     /// Where another effect [takes](Effect::takes_drive) that drive, that one applies the limit.
+    /// Else the last of several effects that limit one drive applies all limits: those of the
+    /// others are in `force_limits` of its site's plant.
     fn force_limit(&self, _values: &[f64]) -> Option<ForceLimit> {
         None
     }

@@ -84,7 +84,15 @@ pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
         sensors,
         keyframes: Vec::new(),
     };
-    let default = default_qpos(model, &layout);
+    layout.keyframes = keyframes(scene, model, &layout)?;
+    Ok(layout)
+}
+
+/// The keyframes of a parsed scene, with every row complete and quaternions of length 1.
+fn keyframes(scene: &Scene, model: &Model, layout: &Layout) -> Result<Vec<Keyframe>> {
+    let default = default_qpos(model, layout);
+    let quaternions = layout.quaternions();
+    let mut keyframes = Vec::with_capacity(model.keyframes.len());
     for (i, key) in model.keyframes.iter().enumerate() {
         let name = key.name.clone().unwrap_or(format!("key{i}"));
         let fill = |values: &[f64], default: Vec<f64>, what: &str| {
@@ -103,14 +111,34 @@ pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
                 })
             }
         };
-        layout.keyframes.push(Keyframe {
-            qpos: fill(&key.qpos, default.clone(), "qpos")?,
-            qvel: fill(&key.qvel, vec![0.0; nv], "qvel")?,
+        let mut qpos = fill(&key.qpos, default.clone(), "qpos")?;
+        for &at in &quaternions {
+            normalise(&mut qpos[at..at + 4]);
+        }
+        keyframes.push(Keyframe {
+            qpos,
+            qvel: fill(&key.qvel, vec![0.0; layout.nv], "qvel")?,
             ctrl: fill(&key.ctrl, vec![0.0; layout.actuators.len()], "ctrl")?,
             name,
         });
     }
-    Ok(layout)
+    Ok(keyframes)
+}
+
+/// Smallest length of a quaternion that has a direction, and largest difference of a length from 1
+/// that is rounding; the same as MuJoCo's (`mjEPS`).
+const ROUNDING: f64 = 1e-14;
+
+/// Gives a quaternion w x y z length 1, as MuJoCo does with those of keyframes.
+///
+/// One without a direction becomes no rotation.
+fn normalise(q: &mut [f64]) {
+    let length = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length < ROUNDING {
+        q.copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
+    } else if (length - 1.0).abs() > ROUNDING {
+        q.iter_mut().for_each(|x| *x /= length);
+    }
 }
 
 /// The range of an actuator; `None` where its ends do not differ, such as `0 0`, which is no limit.
@@ -166,6 +194,23 @@ pub fn default_qpos(model: &Model, layout: &Layout) -> Vec<f64> {
 mod tests {
     use super::*;
     use asid_core::simulator::{Control, ExternalForce, Rollout};
+
+    /// Symptom: on engines without a compiler of their own, an episode began beside the pose of its
+    /// keyframe. Cause: a quaternion such as 0.7 0 0 0.7 was passed on with its length of 0.99.
+    #[test]
+    fn quaternions_of_keyframes_have_length_one() {
+        let xml = r#"<mujoco><worldbody><body><freejoint/><geom size="1"/></body>
+            <body><joint type="ball"/><geom size="1"/></body></worldbody><keyframe>
+            <key qpos="1 2 3 0.7 0 0 0.7 0 3 0 4"/><key qpos="0 0 0 0 0 0 0 1 0 0 0"/></keyframe></mujoco>"#;
+        let scene = Scene::from_xml("keys", xml, &[]).unwrap();
+        let layout = layout(&scene, &scene.description().unwrap()).unwrap();
+        let half = 0.5f64.sqrt();
+        let theory = [1.0, 2.0, 3.0, half, 0.0, 0.0, half, 0.0, 0.6, 0.0, 0.8];
+        for (found, theory) in layout.keyframes[0].qpos.iter().zip(theory) {
+            assert!((found - theory).abs() < 1e-15, "{found} for {theory}");
+        }
+        assert_eq!(layout.keyframes[1].qpos[3..7], [1.0, 0.0, 0.0, 0.0]);
+    }
 
     #[test]
     fn a_body_has_one_external_force() {

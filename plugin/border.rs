@@ -93,6 +93,13 @@ impl Border {
         }
     }
 
+    /// As [`Border::require`], for calls that cannot return an error.
+    pub fn check(self, checked: Result<(), String>) {
+        if let Err(error) = self.require(checked) {
+            panic_any(error.to_string());
+        }
+    }
+
     /// As [`Border::finite`], for calls that cannot return an error.
     pub fn check_finite(self, given: &[f64], values: &[f64], what: &str) {
         if let Err(error) = self.finite(given, values, what) {

@@ -6,6 +6,8 @@
 //! the probability of improvement. Shares of successes have Wilson's interval (Wilson 1927; Brown,
 //! Cai and DasGupta 2001 give the reasons), which is also correct at 0 and 1.
 
+use std::cmp::Ordering;
+
 use asid_core::Streams;
 use asid_core::rng::Rng;
 use rand::Rng as _;
@@ -97,10 +99,12 @@ pub fn improvement(ours: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
         .map(|(x, y)| {
             let pairs = x.iter().flat_map(|a| y.iter().map(move |b| (a, b)));
             let wins: f64 = pairs
-                .map(|(a, b)| match a.total_cmp(b) {
-                    _ if a == b => 0.5,
-                    std::cmp::Ordering::Less => 1.0,
-                    _ => 0.0,
+                .map(|(a, b)| match a.partial_cmp(b) {
+                    Some(Ordering::Less) => 1.0,
+                    Some(Ordering::Equal) => 0.5,
+                    Some(Ordering::Greater) => 0.0,
+                    // A missing value (NaN) is worse than any other; two of them are a tie.
+                    None => 0.5 * (1.0 + f64::from(b.is_nan()) - f64::from(a.is_nan())),
                 })
                 .sum();
             wins / (x.len() * y.len()) as f64
@@ -179,6 +183,15 @@ mod tests {
         // Strata are compared separately and have equal weight whatever their size.
         let p = improvement(&[vec![0.0], vec![9.0, 9.0]], &[vec![1.0], vec![1.0]]);
         assert_eq!(p, 0.5);
+        // A value that is missing is worse than any other, and as good as another missing one.
+        let missing = [vec![f64::NAN]];
+        assert_eq!(improvement(&[vec![9.0]], &missing), 1.0);
+        assert_eq!(improvement(&missing, &[vec![9.0]]), 0.0);
+        assert_eq!(improvement(&missing, &missing), 0.5);
+        // Its sign, which depends on the processor, means nothing.
+        let other = [vec![-f64::NAN]];
+        assert_eq!(improvement(&other, &[vec![9.0]]), 0.0);
+        assert_eq!(improvement(&missing, &other), 0.5);
         // All pairs are alike: the data show no uncertainty.
         assert_eq!(
             improvement_interval(&[vec![0.0; 4]], &[vec![1.0; 4]]),

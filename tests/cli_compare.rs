@@ -213,9 +213,10 @@ fn a_signal_ends_a_comparison_with_the_way_to_go_on() {
         "--threads",
         "1",
     ];
-    for (signal, line) in [
-        ("TERM", "asid: stopped; "),
-        ("USR1", "runs that have begun are finished"),
+    for (signal, line, status) in [
+        ("INT", "asid: stopped; ", 130),
+        ("TERM", "asid: stopped; ", 1),
+        ("USR1", "runs that have begun are finished", 1),
     ] {
         let common = ["compare", "rod-balancing", "--quiet", "--out", signal];
         let mut command = place.asid(&tiny(&[&common[..], &arguments].concat()));
@@ -233,7 +234,7 @@ fn a_signal_ends_a_comparison_with_the_way_to_go_on() {
             .unwrap();
         let output = child.wait_with_output().unwrap();
         let text = said(&output);
-        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert_eq!(output.status.code(), Some(status), "{text}");
         let goes_on =
             format!("`asid compare --config {signal}/config.toml --out {signal}` goes on with it");
         assert!(text.contains(line) && text.contains(&goes_on), "{text}");
@@ -274,6 +275,25 @@ fn shares_in_one_folder_or_merged_give_the_bytes_of_one_process() {
         "{}",
         said(&other)
     );
+}
+
+/// Symptom: a share that had left a method out said that it was stopped, and failed. Cause: the
+/// runs of that method that were not even tried counted as missing.
+#[test]
+fn a_share_that_leaves_a_method_out_is_done() {
+    let place = Workplace::new();
+    // Nothing ships for this explorer.
+    let methods = ["--method", "x=task-ppo+reps+cem", "--method", "dr"];
+    let runs = ["--condition", "left", "--seeds", "4", "--threads", "1"];
+    for (share, out) in [("1/2", "a"), ("2/2", "b")] {
+        let arguments = [&methods[..], &runs, &["--shard", share]].concat();
+        done(&place, &arguments, out);
+    }
+    let merged = place.run(&["compare", "--merge", "a", "b", "--out", "all"]);
+    assert!(merged.status.success(), "{}", said(&merged));
+    let result = result(&place, "all");
+    assert_eq!(result["rows"][0]["n"], 4);
+    assert_eq!(result["omitted"][0]["method"], "x");
 }
 
 #[test]
@@ -457,6 +477,67 @@ fn a_job_array_of_other_settings_or_its_printed_script_changes_no_comparison() {
         );
         assert_eq!(place.read("a/config.toml"), settings);
     }
+}
+
+/// Symptom: a table called a world matched in which a sensor drifted. Cause: only a single run told
+/// such a world from the matched one.
+#[test]
+fn a_world_of_ones_own_is_called_custom_and_never_matched() {
+    let place = Workplace::new();
+    let drift = ["--real-effect", "sensor-drift@rod_pos:z=0.05"];
+    let dr = [&["--method", "dr"][..], &SMALL, &drift].concat();
+    done(&place, &dr, "a");
+    assert_eq!(result(&place, "a")["rows"][0]["world"], "custom");
+    assert!(place.read("a/table.md").contains("World: custom."));
+    let refused = compare(&place, &[&dr[..], &["--world", "matched"]].concat(), "b");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        said(&refused).contains("a matched world is the simulator itself"),
+        "{}",
+        said(&refused)
+    );
+}
+
+/// Symptom: `--set seed=5` and `--set condition=middle` beside the configuration of a comparison
+/// changed nothing. Cause: the plan of the configuration won over the settings of the call.
+#[test]
+fn settings_of_a_call_win_over_the_plan_of_a_configuration() {
+    let place = Workplace::new();
+    done(&place, &[&["--method", "dr"][..], &SMALL].concat(), "a");
+    let own = ["--set", "seed=5", "--set", "condition=middle"];
+    let again = [
+        "compare",
+        "--config",
+        "a/config.toml",
+        "--quiet",
+        "--out",
+        "b",
+    ];
+    let output = place.run(&[&again[..], &own].concat());
+    assert!(output.status.success(), "{}", said(&output));
+    let row = &result(&place, "b")["rows"][0];
+    assert_eq!(row["seeds"], serde_json::json!([5]));
+    assert_eq!(row["condition"], "middle");
+}
+
+/// Symptom: after a call with fewer seeds nothing told that the other runs were in no table any
+/// more.
+#[test]
+fn runs_that_a_call_does_not_name_are_told_of_and_stay() {
+    let place = Workplace::new();
+    let seeds = |n: &'static str| ["--method", "dr", "--condition", "left", "--seeds", n];
+    done(&place, &seeds("3"), "a");
+    let fewer = compare(&place, &seeds("1"), "a");
+    assert!(fewer.status.success(), "{}", said(&fewer));
+    assert!(
+        said(&fewer).contains("2 runs in a are of"),
+        "{}",
+        said(&fewer)
+    );
+    assert_eq!(result(&place, "a")["rows"][0]["n"], 1);
+    let all = compare(&place, &seeds("3"), "a");
+    assert!(said(&all).is_empty(), "{}", said(&all));
+    assert_eq!(result(&place, "a")["rows"][0]["n"], 3);
 }
 
 #[test]

@@ -235,6 +235,76 @@ fn logs_of_a_configuration_are_those_of_its_task_only() {
     assert!(said.contains("these logs are given"), "{said}");
 }
 
+/// Symptom: `asid diagnose robot.xml` ended with a message of the parser of TOML, and of a refined
+/// model with `train` as a missing field. Cause: the file of a model was read as a study.
+#[test]
+fn the_file_of_a_model_is_no_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = ["robot.xml", "refined.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&files[0], "<mujoco/>").unwrap();
+    std::fs::write(&files[1], "model = \"robot.xml\"\n").unwrap();
+    for file in &files {
+        let (said, status) = refusal(&["diagnose", text(file), "--quiet"]);
+        assert!(
+            said.contains("is a model without logs") && said.contains("asid import"),
+            "{said}"
+        );
+        assert_eq!(status, Some(2), "{said}");
+    }
+}
+
+/// Symptom: "leave out --experiments" of a call without this option, and "--minutes: is a number
+/// above 0" of one whose file has the number. Cause: a message named the option wherever the value
+/// came from. No log and no study here exists, so that nothing is read before.
+#[test]
+fn a_message_names_a_setting_as_it_was_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("config.toml");
+    let refused = |settings: &str, options: &[&str], expected: &[&str]| {
+        std::fs::write(&file, settings).unwrap();
+        let call = ["diagnose", "--config", text(&file), "--quiet"];
+        let (said, status) = refusal(&[&call[..], options].concat());
+        assert_eq!(status, Some(2), "{said}");
+        for words in expected {
+            assert!(said.contains(words), "{said}");
+        }
+    };
+    let task = "task = \"shuffleboard\"\n";
+    let logs = "train = [\"a.csv\", \"b.csv\"]\n";
+    let given = ["--task", "shuffleboard", "--train", "c.csv"];
+    refused(
+        &format!("{task}experiments = 2\n"),
+        &given,
+        &[
+            "config experiments: ",
+            "leave out `experiments`, or `--train`",
+        ],
+    );
+    refused(
+        &format!("{task}{logs}"),
+        &["--experiments", "2"],
+        &[
+            "config --experiments: ",
+            "leave out `--experiments`, or `train`",
+        ],
+    );
+    // The logs of the file are diagnosed, so that no run makes any.
+    refused(
+        &format!("{task}{logs}runs = 6\n"),
+        &[],
+        &["config runs: ", "its logs are given"],
+    );
+    refused(
+        "seeds = 3\n",
+        &["study"],
+        &["config seeds: ", "go with --task"],
+    );
+    refused("", &["study", "--seeds", "3"], &["config --seeds: "]);
+    refused("minutes = -1\n", &["study"], &["config minutes: "]);
+    refused("", &["study", "--minutes=-1"], &["config --minutes: "]);
+    refused("false_alarms = 5\n", &["study"], &["config false_alarms: "]);
+}
+
 /// Symptom: `--world perturbed` and `--preset published` beside a study were accepted and ignored,
 /// and no trial was run for `--world` beside logs of a task. Cause: the kind of world did not count
 /// as a description of a run.

@@ -309,6 +309,50 @@ fn episodes_of_a_map_of_pushes_have_a_truth_of_their_own() {
     );
 }
 
+/// Symptom: the seed of a run's configuration changed nothing in a figure. Cause: its episodes
+/// counted up from that of `--seed` alone.
+#[test]
+fn episodes_count_up_from_the_seed_of_the_settings() {
+    let place = Workplace::new();
+    let one = ["--explorer", "random", "--episodes", "1", "--set", "seed=7"];
+    let output = figure(&place, "distractors", &one, "a");
+    assert!(output.status.success(), "{}", said(&output));
+    let balls = place.read("a/balls.csv");
+    let rows = balls.lines().skip(1);
+    let seeds: Vec<&str> = rows.map(|line| line.split(',').nth(1).unwrap()).collect();
+    assert!(
+        !seeds.is_empty() && seeds.iter().all(|s| *s == "7"),
+        "{balls}"
+    );
+}
+
+/// Symptom: a method that could not be run was missing in a curve without a word.
+#[test]
+fn a_curve_of_difficulty_tells_of_methods_that_were_left_out() {
+    let place = Workplace::new();
+    let levels = ["rod-balancing", "--levels", "ledge_width=0.06,0.01"];
+    // Nothing ships for this explorer.
+    let methods = ["--method", "x=task-ppo+reps+cem", "--method", "dr"];
+    let runs = ["--seeds", "1", "--condition", "left"];
+    let output = figure(
+        &place,
+        "difficulty",
+        &[&levels[..], &methods, &runs].concat(),
+        "a",
+    );
+    assert!(output.status.success(), "{}", said(&output));
+    let result = result(&place, "a");
+    let notes = result["notes"].as_array().unwrap();
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    assert!(
+        notes[0]
+            .as_str()
+            .unwrap()
+            .starts_with("Left out: x on rod-balancing"),
+        "{notes:?}"
+    );
+}
+
 #[test]
 fn a_wrong_setting_of_an_explorer_is_told_of_before_any_episode() {
     let place = Workplace::new();

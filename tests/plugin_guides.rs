@@ -157,6 +157,48 @@ fn a_new_plugin_has_no_absolute_paths() {
     assert!(!place.path("other").exists());
 }
 
+/// Symptom: `cargo build` in a new plugin below a checkout: "current package believes it's in a
+/// workspace when it's not". Cause: its manifest named no workspace, so that cargo took the one
+/// above.
+#[test]
+fn a_new_plugin_is_a_package_of_its_own_below_a_workspace() {
+    let place = Workplace::new();
+    place.write("Cargo.toml", "[workspace]\nmembers = []\n");
+    for kind in ["task", "explorer", "effect"] {
+        let dir = format!("my-{kind}");
+        assert!(place.run(&["new", kind, &dir]).status.success());
+        let read = Command::new(env!("CARGO"))
+            .args(["metadata", "--no-deps", "--offline", "--format-version=1"])
+            .current_dir(place.path(&dir))
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&read.stderr);
+        assert!(read.status.success(), "{kind}: {said}");
+    }
+}
+
+/// Symptom: a new explorer `multisine-2` was called `multisine_2-2`, and its README named the library
+/// `libmultisine-2.so`, which cargo calls `libmultisine_2.so`. Cause: an example's name of one word
+/// is the same in code, and was replaced twice, or by the name that is no identifier.
+#[test]
+fn the_name_of_a_new_plugin_may_hold_that_of_its_example() {
+    let place = Workplace::new();
+    for (kind, name) in [
+        ("explorer", "multisine-2"),
+        ("effect", "magnetic-catch-2"),
+        ("task", "my-payload-swing"),
+    ] {
+        assert!(place.run(&["new", kind, name]).status.success());
+        for file in ["Cargo.toml", "src/lib.rs"] {
+            let text = place.read(&format!("{name}/{file}"));
+            assert!(text.contains(&format!("\"{name}\"")), "{file}: {text}");
+        }
+        let readme = place.read(&format!("{name}/README.md"));
+        let library = format!("--plugin target/release/lib{}.so", name.replace('-', "_"));
+        assert!(readme.contains(&library), "{readme}");
+    }
+}
+
 #[test]
 fn the_guide_to_tasks_leads_to_a_run() {
     follow(GUIDES[0], &TINY);

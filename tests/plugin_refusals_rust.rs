@@ -78,6 +78,10 @@ fn a_tasks_failures_end_as_one_line() {
         ("attempt-panics", "panicked: no torque for the attempt"),
         ("attempt-fails", "the motor is too weak"),
         ("commands-panic", "panicked: no commands today"),
+        (
+            "locate-is-long",
+            "reading of the start has 2 values where its start has 1",
+        ),
     ] {
         faulty_says(
             &[&[task, "--explorer", "random"], &TINY[..]].concat(),

@@ -247,15 +247,15 @@ impl LocalFit {
             let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
                 let by = Precision::correlated(weighing, self.freedom_of(weighing));
                 let factor = implied(&by, &columns)?;
-                Some(inflation(&by, &columns, asked, self.freedom_of(asked), &factor))
+                inflation(&by, &columns, asked, self.freedom_of(asked), &factor)
             };
             inflated = (of(&one, &other)? + of(&other, &one)?) * 0.5;
         } else {
             precision = Precision::diagonal(&self.spread());
             lower = implied(&precision, &columns)?;
-            inflated = inflation(&precision, &columns, &self.luck, self.freedom, &lower);
+            inflated = inflation(&precision, &columns, &self.luck, self.freedom, &lower)?;
         }
-        let narrowing = narrowing(&lower, inflated)?;
+        let narrowing = narrowing(&lower, &inflated)?;
         let curvature = precision.weigh(&self.slopes) * columns;
         self.outside(&(narrowing.transpose() * curvature * narrowing))
     }

@@ -68,10 +68,10 @@ impl Precision {
 
 /// Variance of an estimate over the one that the weights imply, along every direction at once.
 ///
-/// `b` are the slopes (readings x entries) and the rows of `epsilon` the roughness. The weights give
-/// the curvature `H = b^T P b`, and the sandwich formula gives the covariance `H^-1 M H^-1`, with
-/// `M = b^T P (1 + R) P b`. Returned is `L^T M L`, where `L L^T = H^-1`: the covariance in coordinates
-/// in which the implied one is the identity. `lower` is `L`, of [`implied`].
+/// `b` are the slopes (readings x entries) and the rows of `epsilon` the roughness. The weights
+/// give the curvature `H = b^T P b`, and the sandwich formula gives the covariance `H^-1 M H^-1`,
+/// with `M = b^T P (1 + R) P b`. Returned is `L^-1 M L^-T`, where `L L^T = H`: the covariance of
+/// `L^T x`, in which the implied one is the identity. `lower` is `L`, of [`implied`].
 #[must_use]
 pub fn inflation(
     precision: &Precision,
@@ -79,38 +79,43 @@ pub fn inflation(
     epsilon: &DMatrix<f64>,
     freedom: f64,
     lower: &DMatrix<f64>,
-) -> DMatrix<f64> {
-    let weighed = lower.transpose() * precision.weigh(&b.transpose());
+) -> Option<DMatrix<f64>> {
+    let weighed = lower.solve_lower_triangular(&precision.weigh(&b.transpose()))?;
     let projected = &weighed * epsilon.transpose();
-    &weighed * weighed.transpose() + &projected * projected.transpose() / freedom
+    Some(&weighed * weighed.transpose() + &projected * projected.transpose() / freedom)
 }
 
-/// Lower factor of `H^-1`, the covariance that weights imply at slopes `b` (readings x entries).
+/// Lower factor `L` of the curvature `H = L L^T` that weights imply at slopes `b` (readings x
+/// entries).
 #[must_use]
 pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = b.ncols();
+    let h = precision.weigh(&b.transpose()) * b;
     // In standardised coordinates: a direction that the data do not see keeps the region's width.
-    let h = precision.weigh(&b.transpose()) * b + DMatrix::identity(n, n) * 1e-9;
-    Some(h.cholesky()?.inverse().cholesky()?.l())
+    // The share of the trace is above the rounding of the sums.
+    let ridge = 1e-9 + 1e-12 * h.trace();
+    Some((h + DMatrix::identity(n, n) * ridge).cholesky()?.l())
 }
 
-/// Transformation `W^-1` that gives a loss with curvature `H` the width of the sandwich formula.
+/// Transformation `N` that gives a loss with curvature `H` the width of the sandwich formula.
 ///
-/// The loss at `best + W^-1 (u - best)` has the covariance `W H^-1 W^T = H^-1 M H^-1` at `best`
-/// (curvature adjustment: Ribatet, Cooley and Davison 2012). Each direction is widened by what *its*
-/// readings scatter, so that an unknown that smooth readings determine keeps its narrow interval
-/// beside one that rough readings determine. No direction becomes narrower than the weights imply.
+/// The loss at `best + N (u - best)` has the covariance `N^-1 H^-1 N^-T = H^-1 M H^-1` at `best`
+/// (curvature adjustment: Ribatet, Cooley and Davison 2012). Each direction is widened by what
+/// *its* readings scatter, so that an unknown that smooth readings determine keeps its narrow
+/// interval beside one that rough readings determine. No direction becomes narrower than the
+/// weights imply.
+///
+/// `lower` is the factor of `H`, of [`implied`], and `inflation` the matrix of [`inflation`].
 #[must_use]
-pub fn narrowing(lower: &DMatrix<f64>, inflation: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let eigen = symmetric_eigen((&inflation + inflation.transpose()) * 0.5)?;
+pub fn narrowing(lower: &DMatrix<f64>, inflation: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let eigen = symmetric_eigen((inflation + inflation.transpose()) * 0.5)?;
     let axes = eigen.eigenvectors;
-    let mut narrowed = lower * &axes;
+    let upper = lower.transpose();
+    let mut narrowed = upper.solve_upper_triangular(&axes)?;
     for (mut column, v) in narrowed.column_iter_mut().zip(&eigen.eigenvalues) {
         column /= v.max(1.0).sqrt();
     }
-    let n = lower.nrows();
-    let whiten = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
-    Some(narrowed * axes.transpose() * whiten)
+    Some(narrowed * axes.transpose() * upper)
 }
 
 fn scale_columns(x: &mut DMatrix<f64>, by: &DVector<f64>) {
@@ -145,8 +150,8 @@ mod tests {
         let epsilon = DMatrix::from_row_slice(2, 4, &[2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0]);
         let precision = Precision::diagonal(&DVector::from_vec(vec![0.5, 1.0, 1.0, 1.0]));
         let lower = implied(&precision, &b).unwrap();
-        let inflated = inflation(&precision, &b, &epsilon, 1.0, &lower);
-        let back = narrowing(&lower, inflated).unwrap();
+        let inflated = inflation(&precision, &b, &epsilon, 1.0, &lower).unwrap();
+        let back = narrowing(&lower, &inflated).unwrap();
         let p = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0 / 1.5, 0.5, 0.5, 0.5]));
         let h = b.transpose() * &p * &b;
         let covariance = DMatrix::identity(4, 4) + epsilon.transpose() * &epsilon;
@@ -154,6 +159,29 @@ mod tests {
         let bread = h.clone().try_inverse().unwrap();
         let sandwich = &bread * m * &bread;
         let adjusted = (back.transpose() * h * back).try_inverse().unwrap();
-        assert!((&adjusted - &sandwich).norm() < 1e-6 * sandwich.norm(), "{adjusted} {sandwich}");
+        assert!(
+            (&adjusted - &sandwich).norm() < 1e-6 * sandwich.norm(),
+            "{adjusted} {sandwich}"
+        );
+    }
+
+    /// The readings show only the sum of two entries, to a thousandth of the region's width. Along
+    /// the difference the loss keeps its shape; along the sum it is widened.
+    #[test]
+    fn a_direction_that_no_reading_sees_stays_as_it_is() {
+        let m = 1000;
+        let b = DMatrix::from_fn(m, 2, |k, _| 50.0 * (0.01 * k as f64).sin());
+        // Every simulation is off by a multiple of what the sum does.
+        let epsilon = DMatrix::from_fn(8, m, |i, k| [1.0, -1.0][i % 2] * b[(k, 0)]);
+        let precision = Precision::diagonal(&DVector::repeat(m, 0.0));
+        let lower = implied(&precision, &b).unwrap();
+        let inflated = inflation(&precision, &b, &epsilon, 8.0, &lower).unwrap();
+        let back = narrowing(&lower, &inflated).unwrap();
+        let apart = DVector::from_vec(vec![1.0, -1.0]);
+        assert!((&back * &apart - &apart).norm() < 1e-3, "{back}");
+        // M / H = 1 + |b|^2 along the sum.
+        let ratio = 1.0 + b.column(0).norm_squared();
+        let sum = (&back * DVector::from_vec(vec![0.5, 0.5])).sum();
+        assert!((sum * ratio.sqrt() - 1.0).abs() < 1e-3, "{sum} {ratio}");
     }
 }

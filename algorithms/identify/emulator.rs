@@ -15,10 +15,10 @@
 //!
 //! `H^-1 B^T W (1 + R) W B H^-1`, `H = B^T W B`, `B = de/dx`, `R = cov(epsilon)`
 //!
-//! The loss is stretched about its minimum until its width there is the sandwich's: each direction by
-//! its own ratio ([`narrowing`]). Where the emulator does not explain the observation within noise
-//! and roughness, the loss is also divided by the mismatch (a temperature).
-//! Points are never selected by how well they fit, which would bias the result.
+//! The loss is stretched about its minimum until its width there is the sandwich's: each direction
+//! by its own ratio ([`narrowing`]). Where the emulator does not explain the observation within
+//! noise and roughness, the loss is also divided by the mismatch (a temperature). Points are never
+//! selected by how well they fit, which would bias the result.
 
 use crate::fisher::precision::{Precision, implied, inflation, narrowing};
 use asid_core::rng::Rng;
@@ -43,6 +43,8 @@ pub struct Emulator {
     best: DVector<f64>,
     /// Transformation of steps from the best point that makes the loss as wide as the sandwich.
     narrowing: DMatrix<f64>,
+    /// Slope that is added along transformed steps; 0 where the best point is a minimum.
+    tilt: DVector<f64>,
     /// Factor on the loss: the inverse of the mismatch.
     temperature: f64,
     /// Root mean square of the emulated whitened residual at its best point.
@@ -90,8 +92,8 @@ fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
 impl Emulator {
     /// Fits the residuals of points in a region; `None` where there are too few points.
     ///
-    /// `readings` is the number of residual entries that are present. Readings are weighted by the variance of their roughness
-    /// or, if `correlated`, by its whole covariance along the episode.
+    /// `readings` is the number of residual entries that are present. Readings are weighted by the
+    /// variance of their roughness or, if `correlated`, by its whole covariance along the episode.
     #[must_use]
     pub fn fit(
         region: &Gaussian,
@@ -130,6 +132,7 @@ impl Emulator {
             gram,
             best: DVector::zeros(n),
             narrowing: DMatrix::identity(n, n),
+            tilt: DVector::zeros(n),
             temperature: 1.0,
             residual: 0.0,
             roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
@@ -163,13 +166,21 @@ impl Emulator {
             let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
                 let by = Precision::correlated(weighing, share * weighing.nrows() as f64);
                 let freedom = share * asked.nrows() as f64;
-                Some(inflation(&by, &b, asked, freedom, &implied(&by, &b)?))
+                inflation(&by, &b, asked, freedom, &implied(&by, &b)?)
             };
             (of(&halves[0], &halves[1])? + of(&halves[1], &halves[0])?) * 0.5
         } else {
-            inflation(&precision, &b, &epsilon, freedom, &lower)
+            inflation(&precision, &b, &epsilon, freedom, &lower)?
         };
-        emulator.narrowing = narrowing(&lower, inflated)?;
+        emulator.narrowing = narrowing(&lower, &inflated)?;
+        // A minimum beyond reach leaves a slope `g` at the best point. A quadratic loss that is
+        // stretched about that minimum has the slope `N^T N^T g` there, and `N^T g` without the
+        // tilt.
+        let uphill = &emulator.gram * &best_features;
+        let slope = DVector::from_fn(n, |k, _| {
+            DVector::from_vec(feature_slope(&best, k)).dot(&uphill)
+        });
+        emulator.tilt = emulator.narrowing.tr_mul(&slope) - slope;
         emulator.best = DVector::from_vec(best);
         emulator.temperature = 1.0 / mismatch.max(1.0);
         Some(emulator)
@@ -188,9 +199,10 @@ impl Emulator {
 
     /// [`loss`](Self::loss) at a standardised point.
     fn widened(&self, u: &[f64]) -> f64 {
-        let step = DVector::from_column_slice(u) - &self.best;
-        let nearer = &self.best + &self.narrowing * step;
-        self.temperature * self.loss_at(nearer.as_slice())
+        let step = &self.narrowing * (DVector::from_column_slice(u) - &self.best);
+        let tilted = self.tilt.dot(&step);
+        let nearer = &self.best + step;
+        self.temperature * (self.loss_at(nearer.as_slice()) + tilted)
     }
 
     /// The best point within reach, in standardised coordinates, by damped Newton steps.
@@ -435,6 +447,36 @@ mod tests {
         };
         assert!((std(0) / 0.2 - 1.0).abs() < 0.3, "{}", std(0));
         assert!(std(1) > 0.9, "{}", std(1));
+    }
+
+    /// A linear simulator whose minimum lies 5 standard deviations of the region from its middle.
+    /// The loss within reach is that of the sandwich about this minimum.
+    #[test]
+    fn a_minimum_beyond_reach_leaves_the_slope_of_the_sandwich() {
+        let (m, slope, rough, minimum): (usize, f64, f64, f64) = (100, 0.5, 0.6, 5.0);
+        let region = Gaussian::diagonal(&[0.0], &[1.0], &[-9.0], &[9.0]);
+        // Every point twice, with a shift of all readings up and down: the regression is exact.
+        let points: Vec<Vec<f64>> = (0..32)
+            .map(|i| vec![0.2 * f64::from(i / 2) - 1.5])
+            .collect();
+        let residuals: Vec<Vec<f64>> = points
+            .iter()
+            .zip([rough, -rough].into_iter().cycle())
+            .map(|(x, luck)| vec![slope * (x[0] - minimum) + luck; m])
+            .collect();
+        let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+        assert!((emulator.best()[0] - REACH).abs() < 1e-6);
+        // Of the noise, and of the shift: 32 points less 3 features tell its variance.
+        let shift = rough.powi(2) * 32.0 / 29.0;
+        let variance = (1.0 / m as f64 + shift) / slope.powi(2);
+        let wanted = |x: f64| 0.5 * (x - minimum).powi(2) / variance;
+        for x in [-2.0, 0.0, 2.0] {
+            let rise = emulator.loss(&[x]) - emulator.loss(&[REACH]);
+            let right = wanted(x) - wanted(REACH);
+            assert!((rise / right - 1.0).abs() < 1e-3, "{x}: {rise} {right}");
+        }
     }
 
     #[test]

@@ -222,14 +222,8 @@ pub fn posterior(
         let points: Vec<&[f64]> = near.iter().map(|&i| &*samples.points[i]).collect();
         let residuals: Vec<&[f64]> = near.iter().map(|&i| &*samples.residuals[i]).collect();
         let present = likelihood.present();
-        let emulator = Emulator::fit(
-            &region,
-            &points,
-            &residuals,
-            present,
-            settings.correlated,
-        )
-        .ok_or_else(too_few)?;
+        let emulator = Emulator::fit(&region, &points, &residuals, present, settings.correlated)
+            .ok_or_else(too_few)?;
         let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
         let posterior =

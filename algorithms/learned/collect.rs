@@ -52,12 +52,16 @@ impl Dataset {
 /// Plays `episodes` episodes of an explorer over the problem's threads, each with its own random
 /// stream.
 ///
-/// Episodes that diverged are left out.
+/// Episodes that diverged are left out. An explorer that has to learn its policy first does so
+/// once, from the problem's own streams; all episodes play that policy.
 ///
 /// # Errors
 /// When the explorer or the engine fails, or more than half of the episodes diverge.
 pub fn collect(problem: &Problem<'_>, explorer: &dyn Explorer, episodes: usize) -> Result<Dataset> {
     let history = History::new(problem)?;
+    // Every episode asks the explorer for its policy, on any thread and with streams of its own.
+    // What it learns is therefore learned here, and kept by the explorer.
+    drop(explorer.explore(problem, None)?);
     let threads = match problem.threads {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         n => n,
@@ -153,7 +157,7 @@ fn one(
             *a = a.clamp(c.range[0], c.range[1]);
         }
         batch.step(&action)?;
-        if batch.frames(0).iter().any(|x| !x.is_finite()) {
+        if !batch.alive(0) {
             return Ok(None);
         }
         history.write(&mut numbers, step + 1, batch.frames(0));
@@ -165,10 +169,64 @@ fn one(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::OnceLock;
+
+    use asid_core::explore::{Explored, Policy};
     use asid_core::registry::{ExplorerEntry, find};
 
     use super::*;
     use crate::testing::with_problem;
+
+    /// Always the same push.
+    struct Push(f64);
+
+    impl Policy for Push {
+        fn reset(&mut self) {}
+
+        fn act(&mut self, _step: usize, _reading: &[f64], action: &mut [f64]) -> Result<()> {
+            action.fill(0.05 * self.0);
+            Ok(())
+        }
+
+        fn export(&self) -> serde_json::Value {
+            serde_json::Value::Null
+        }
+    }
+
+    /// Learns a push on the spot, from the streams of the first problem that it is asked about.
+    struct Learner(OnceLock<f64>);
+
+    fn learned(problem: &Problem<'_>) -> f64 {
+        rand::Rng::random(&mut problem.streams.stream("learner"))
+    }
+
+    impl Explorer for Learner {
+        fn explore<'a>(
+            &'a self,
+            problem: &'a Problem<'a>,
+            _start: Option<&[f64]>,
+        ) -> Result<Explored<'a>> {
+            let push = *self.0.get_or_init(|| learned(problem));
+            Ok(Explored {
+                policy: Box::new(Push(push)),
+                curve: Vec::new(),
+                curve_label: "",
+                objective: String::new(),
+            })
+        }
+    }
+
+    /// Symptom: an estimator for an explorer that learns on the spot was another one at each number
+    /// of threads, and from another policy than a run with the same seed plays. Cause: each thread
+    /// had the explorer learn for itself, from the streams of one of its episodes.
+    #[test]
+    fn an_explorer_learns_once_and_from_the_problems_own_streams() {
+        with_problem("rod-balancing", |problem| {
+            let explorer = Learner(OnceLock::new());
+            collect(problem, &explorer, 2).unwrap();
+            assert_eq!(explorer.0.get(), Some(&learned(problem)));
+        });
+    }
 
     #[test]
     fn episodes_do_not_depend_on_the_number_of_threads() {

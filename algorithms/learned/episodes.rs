@@ -1,5 +1,5 @@
-//! A batch of exploration episodes as trackers see them: noisy readings, one simulation per
-//! episode, and no copies.
+//! A batch of exploration episodes as trackers see them: noisy readings at the trackers' rate, one
+//! simulation per episode, and no copies.
 
 use std::sync::atomic::Ordering;
 
@@ -8,6 +8,7 @@ use asid_core::problem::Batch;
 use asid_core::rng::Rng;
 use asid_core::simulator::{Control, Rollout};
 use asid_core::task::Commander;
+use asid_core::tracker::ReadingFrames;
 use asid_core::{Problem, Result};
 use asid_readings::SignalSet;
 use rand::Rng as _;
@@ -21,6 +22,8 @@ pub struct EpisodeBatch<'a> {
     commanders: Vec<Box<dyn Commander>>,
     recording: Recording,
     signals: SignalSet,
+    /// Which frames have readings of the trackers.
+    read: ReadingFrames,
     substeps: usize,
     frames_per_step: usize,
     control: Vec<f64>,
@@ -29,6 +32,8 @@ pub struct EpisodeBatch<'a> {
     frames: Vec<f64>,
     /// The latest reading, `episodes x width`.
     latest: Vec<f64>,
+    /// Whether each episode still runs, that is, has not diverged.
+    alive: Vec<bool>,
     step: usize,
     rng: Rng,
 }
@@ -51,6 +56,8 @@ impl<'a> EpisodeBatch<'a> {
                 .map(|_| problem.task.commander())
                 .collect::<Result<_>>()?,
             signals: SignalSet::new(layout, problem.signals)?,
+            read: ReadingFrames::of(problem.task, protocol.frame_period),
+            alive: vec![true; episodes],
             substeps: problem.substeps(protocol.frame_period)?,
             frames_per_step: frames,
             control: vec![0.0; episodes * frames * nu],
@@ -101,7 +108,14 @@ impl<'a> EpisodeBatch<'a> {
         &self.latest[episode * width..][..width]
     }
 
-    /// Frames of an episode's latest control step, `frames x width`, with noise.
+    /// Whether an episode has not diverged.
+    #[must_use]
+    pub fn alive(&self, episode: usize) -> bool {
+        self.alive[episode]
+    }
+
+    /// Frames of an episode's latest control step, `frames x width`, with noise; the tracked
+    /// entries are NaN in frames without a reading of the trackers.
     #[must_use]
     pub fn frames(&self, episode: usize) -> &[f64] {
         let len = self.frames_per_step * self.width();
@@ -134,6 +148,7 @@ impl<'a> EpisodeBatch<'a> {
         for commander in &mut self.commanders {
             commander.reset();
         }
+        self.alive.fill(true);
         self.step = 0;
         let mut latest = std::mem::take(&mut self.latest);
         let read = self
@@ -180,13 +195,30 @@ impl<'a> EpisodeBatch<'a> {
         self.problem
             .env_counter
             .fetch_add(episodes, Ordering::Relaxed);
+        self.look();
         self.step += 1;
-        let width = self.width();
-        for e in 0..self.episodes() {
-            let last = ((e + 1) * self.frames_per_step - 1) * width;
-            self.latest[e * width..][..width].copy_from_slice(&self.frames[last..][..width]);
-        }
         Ok(())
+    }
+
+    /// Takes the frames of the present control step as the trackers show them.
+    ///
+    /// Where a reading is missing the latest one is kept, as a tracker's driver does.
+    fn look(&mut self) {
+        let (width, tracked) = (self.width(), self.signals.width());
+        let played = self.step * self.frames_per_step;
+        let episodes = self.frames.chunks_exact_mut(self.frames_per_step * width);
+        for (e, frames) in episodes.enumerate() {
+            self.alive[e] &= frames.iter().all(|x| x.is_finite());
+            let latest = &mut self.latest[e * width..][..width];
+            for (i, row) in frames.chunks_exact_mut(width).enumerate() {
+                latest[tracked..].copy_from_slice(&row[tracked..]);
+                if self.read.has(played + i + 1) {
+                    latest[..tracked].copy_from_slice(&row[..tracked]);
+                } else {
+                    row[..tracked].fill(f64::NAN);
+                }
+            }
+        }
     }
 
     fn add_noise(&mut self, rows: &mut [f64]) {
@@ -198,5 +230,49 @@ impl<'a> EpisodeBatch<'a> {
                 signals.add_noise(&mut row[..tracked], || StandardNormal.sample(rng));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::with_problem;
+
+    /// Frames and reading of the second of two episodes after one control step.
+    fn played(problem: &Problem<'_>) -> [Vec<f64>; 2] {
+        let rng = problem.streams.stream("episodes");
+        let mut batch = EpisodeBatch::new(problem, 2, rng).unwrap();
+        batch.begin().unwrap();
+        batch.step(&[0.05, 0.0, -0.02, 0.05]).unwrap();
+        [batch.frames(1).to_vec(), batch.reading(1).to_vec()]
+    }
+
+    /// Symptom: an estimator for a tracker of 10 Hz learned from the means of 50 Hz readings over
+    /// each control step, which lag behind the single reading that such a tracker gives. Cause: the
+    /// trackers' rate was left out of the episodes of a training.
+    #[test]
+    fn a_slow_tracker_gives_one_reading_a_control_step() {
+        with_problem("rod-balancing", |problem| {
+            let levels = [("tracker_rate".to_owned(), 10.0)].into();
+            let slow = problem.task.adjusted(&levels).unwrap().unwrap();
+            let [every, reading] = played(problem);
+            let [some, latest] = played(&Problem {
+                task: &*slow,
+                ..*problem
+            });
+            let width = reading.len();
+            // Position and orientation of the rod come first; the hand is read at every frame.
+            let tracked = 7;
+            let rows = every.chunks_exact(width).zip(some.chunks_exact(width));
+            for (frame, (a, b)) in (1..).zip(rows) {
+                assert_eq!(a[tracked..], b[tracked..]);
+                if frame == 5 {
+                    assert_eq!(a, b);
+                } else {
+                    assert!(b[..tracked].iter().all(|x| x.is_nan()), "frame {frame}");
+                }
+            }
+            assert_eq!(reading, latest);
+        });
     }
 }

@@ -7,6 +7,7 @@
 //! For each unknown the network gives a Gaussian in prior-scaled coordinates, truncated to the
 //! prior's box ([`crate::inference`]). Its standard deviations are calibrated on held-out episodes.
 
+mod trackers;
 mod training;
 
 use std::path::Path;
@@ -26,6 +27,7 @@ use crate::history::History;
 use crate::inference::Inference;
 use crate::learning::{Cache, SHIPPED, TRAIN, events_of, from_program, is_file};
 use crate::tensorboard::encode;
+use trackers::other_readings;
 pub use training::{EstimatorTrainer, Fitted, Score, can_train, score};
 
 /// Name of the identifier.
@@ -190,7 +192,8 @@ impl Estimator {
             let name = shipped_name(&self.explorer);
             why = "none ships for this task and explorer".into();
             if let Some(saved) = from_program(problem.task.name(), &name)? {
-                match self.misfit(problem, &saved)? {
+                let misfit = self.misfit(problem, &saved)?;
+                match misfit.or_else(|| other_readings(problem)) {
                     None => return Ok(Arc::new(saved)),
                     Some(misfit) => why = format!("the one that ships {misfit}"),
                 }

@@ -41,6 +41,9 @@ pub struct FisherPpo {
     /// The objective. The default `d-optimal` does not saturate, unlike `a-optimal`, and still
     /// distinguishes good episodes from better ones. The start pose counts as known, which needs
     /// fewer copies (3 instead of 9 on rod balancing).
+    ///
+    /// A policy that was trained before observes the information as in its training, whatever is
+    /// set here.
     pub fisher: FisherSettings,
     /// Policy that was trained on the spot; not a setting.
     #[serde(skip)]
@@ -97,6 +100,16 @@ pub fn entries(observer: &Observer) -> Vec<ObservationEntry> {
     observer.entries().iter().map(entry).collect()
 }
 
+impl FisherPpo {
+    /// How the information that a file's policy observes is computed: as in its training.
+    fn observed_by(&self, saved: &Saved) -> FisherSettings {
+        let stored = saved.description.settings.get("fisher");
+        stored
+            .and_then(|settings| FisherSettings::deserialize(settings).ok())
+            .unwrap_or_else(|| self.fisher.clone())
+    }
+}
+
 impl LearnedExplorer for FisherPpo {
     const NAME: &'static str = "fisher-ppo";
 
@@ -123,8 +136,9 @@ impl LearnedExplorer for FisherPpo {
     }
 
     fn play<'a>(&'a self, problem: &'a Problem<'a>, saved: Arc<Saved>) -> Result<Explored<'a>> {
-        let observe = Box::new(Shadowed::new(problem, &self.fisher)?);
-        Playing::explored(saved, observe, self.fisher.describe())
+        let fisher = self.observed_by(&saved);
+        let observe = Box::new(Shadowed::new(problem, &fisher)?);
+        Playing::explored(saved, observe, fisher.describe())
     }
 }
 
@@ -178,6 +192,7 @@ mod tests {
     use asid_core::{RealWorld as _, Streams};
     use asid_worlds::SimulatedWorld;
 
+    use asid_algorithms::fisher::Form;
     use asid_core::Explorer as _;
 
     use super::*;
@@ -281,6 +296,35 @@ mod tests {
         });
     }
 
+    /// Symptom: a policy that was trained with `--set explorer.fisher.form=one-step` observed the
+    /// information of the trajectory form when it was played from its file, and the result named
+    /// the latter as its objective. Cause: the settings of the player were used, not the file's.
+    #[test]
+    fn a_policy_observes_the_information_as_in_its_training() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("policy.safetensors");
+        with_problem("rod-balancing", |problem| {
+            let trained = FisherPpo {
+                fisher: FisherSettings {
+                    objective: Objective::AOptimal,
+                    form: Form::OneStep,
+                    ..FisherPpo::default().fisher
+                },
+                ..FisherPpo::default()
+            };
+            let mut file = saved(problem, &by_information(problem));
+            file.description.settings = serde_json::to_value(&trained).unwrap();
+            file.save(&path).unwrap();
+            let playing = FisherPpo {
+                policy: path.display().to_string(),
+                ..FisherPpo::default()
+            };
+            assert_eq!(playing.observed_by(&file), trained.fisher);
+            let explored = playing.explore(problem, None).unwrap();
+            assert_eq!(explored.objective, trained.fisher.describe());
+        });
+    }
+
     #[test]
     fn a_policy_of_another_task_or_explorer_is_refused() {
         let folder = tempfile::tempdir().unwrap();
@@ -328,6 +372,7 @@ mod tests {
                 "cargo xtask setup",
                 "--features torch",
                 "--train FILE",
+                "training is asked for",
             ] {
                 assert!(message.contains(part), "{message}");
             }

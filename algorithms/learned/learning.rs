@@ -188,10 +188,11 @@ pub fn obtain<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result
         return Ok(saved);
     }
     if policy == SHIPPED || !can_train(L::NAME) {
-        let why = refused.map_or_else(
-            || "what ships is for the task's own settings".to_owned(),
-            |why| format!("what ships for this task {why}"),
-        );
+        let why = match refused {
+            Some(why) => format!("what ships for this task {why}"),
+            None if policy == TRAIN => "training is asked for".to_owned(),
+            None => "what ships is for the task's own settings".to_owned(),
+        };
         return Err(missing(problem.task.name(), L::NAME, &why));
     }
     let saved = Arc::new(train(explorer, problem)?.0);

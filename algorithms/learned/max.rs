@@ -291,10 +291,13 @@ impl Observe for Motion {
         for &(start, len) in &self.channels {
             let row = &reading[start..start + len];
             if len == 4 {
-                let finite = row.iter().all(|x| x.is_finite());
-                let wxyz = if finite { row } else { &[1.0, 0.0, 0.0, 0.0] };
-                let rotation = unit_quaternion(wxyz).to_rotation_matrix();
-                now[at..at + 6].copy_from_slice(&rotation.matrix().as_slice()[..6]);
+                let out = &mut now[at..at + 6];
+                if row.iter().all(|x| x.is_finite()) {
+                    let rotation = unit_quaternion(row).to_rotation_matrix();
+                    out.copy_from_slice(&rotation.matrix().as_slice()[..6]);
+                } else {
+                    out.fill(f64::NAN);
+                }
                 at += 6;
             } else {
                 now[at..at + len].copy_from_slice(row);
@@ -302,18 +305,25 @@ impl Observe for Motion {
             }
         }
         if step == 0 || self.before.len() != places {
-            self.before = now.to_vec();
+            self.before = vec![f64::NAN; places];
         }
-        // Missing entries keep their previous value.
-        for (x, before) in now.iter_mut().zip(&self.before) {
+        // Missing entries keep their previous value; those that were never read are 0. The first
+        // reading is no change.
+        let entries = now.iter_mut().zip(rest.iter_mut()).zip(&mut self.before);
+        for ((x, change), before) in entries {
             if !x.is_finite() {
-                *x = if before.is_finite() { *before } else { 0.0 };
+                *x = *before;
+            }
+            *change = if before.is_finite() {
+                *x - *before
+            } else {
+                0.0
+            };
+            *before = *x;
+            if !x.is_finite() {
+                *x = 0.0;
             }
         }
-        for ((change, x), before) in rest.iter_mut().zip(&*now).zip(&self.before) {
-            *change = if before.is_finite() { x - before } else { 0.0 };
-        }
-        self.before.copy_from_slice(now);
         let mut at = places;
         for [object, hand] in self.relations() {
             for i in 0..3 {
@@ -352,6 +362,33 @@ mod tests {
             assert_eq!(out[..2], [0.6, 0.1]);
             assert!((out[12] - 0.1).abs() < 1e-12 && out[13] == 0.0);
             assert!((out[27] - 1.0 / 20.0).abs() < 1e-12);
+        });
+    }
+
+    /// Symptom: a tracker that lost the rod showed it as turned to the axes of the world, and a
+    /// position that was first read late as a jump from the origin. Cause: a missing orientation
+    /// was replaced by none, and a missing first position was kept as 0.
+    #[test]
+    fn what_is_not_read_does_not_move() {
+        with_problem("rod-balancing", |problem| {
+            let mut motion = Motion::new(problem).unwrap();
+            let names = problem.task.exploration().channels();
+            let width = problem.model.layout().recording(&names).unwrap().width();
+            let mut reading = vec![0.0; width];
+            // Half a radian about the vertical; the first x of the position is missing.
+            let (sin, cos) = 0.25_f64.sin_cos();
+            reading[..7].copy_from_slice(&[f64::NAN, 0.1, 0.0, cos, 0.0, 0.0, sin]);
+            let mut out = vec![f64::NAN; 28];
+            motion.observe(0, &reading, &mut out).unwrap();
+            assert_eq!(out[..2], [0.0, 0.1]);
+            let turned = out[3..9].to_vec();
+            assert!((turned[1] - 0.5_f64.sin()).abs() < 1e-12);
+            reading[0] = 0.5;
+            reading[3..7].fill(f64::NAN);
+            motion.observe(1, &reading, &mut out).unwrap();
+            assert_eq!(out[..2], [0.5, 0.1]);
+            assert_eq!(out[3..9], turned);
+            assert_eq!(out[12..24], [0.0; 12]);
         });
     }
 }

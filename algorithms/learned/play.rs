@@ -115,10 +115,10 @@ impl Plays for Playing<'_> {
     /// `{"kind": "network", "observation": [{"name", "len"}], "action": [{"name", "unit",
     /// "range"}], "network": …, "trained": …}`.
     ///
-    /// The network is in the format of [`Policy`]: a normaliser `(x - mean) / sqrt(variance)`,
-    /// clipped at plus and minus 10, then layers `y = x W + b` (`weight` is inputs x outputs, row
-    /// by row) with tanh between them. The outputs, clipped to -1 to 1, span each action's range.
-    /// `trained` describes the training.
+    /// The network is in the format of [`Policy`]: a normaliser `(x - mean) / sqrt(variance +
+    /// 1e-8)`, clipped at plus and minus 10 (none where `count` is 0), then layers `y = x W + b`
+    /// (`weight` is inputs x outputs, row by row) with tanh between them. The outputs, clipped to
+    /// -1 to 1, span each action's range. `trained` describes the training.
     fn export(&self) -> serde_json::Value {
         let d = &self.saved.description;
         json!({

@@ -1,7 +1,7 @@
 //! Trains the identifier `estimator`; its settings and use are in [`asid_learned::estimator`].
 
 use asid_core::progress::Progress;
-use asid_core::{Parameter, Result};
+use asid_core::{Error, Parameter, Result};
 use asid_learned::estimator::Fitted;
 use asid_learned::tensorboard::Scalars;
 use asid_learned::{Dataset, Estimator, EstimatorTrainer, Inference};
@@ -53,7 +53,7 @@ fn fit(
             batches += 1.0;
         }
         let loss = tch::no_grad(|| net.loss(&held_out)).double_value(&[]);
-        if best.as_ref().is_none_or(|(b, _)| loss < *b) {
+        if loss.is_finite() && best.as_ref().is_none_or(|(b, _)| loss < *b) {
             best = Some((loss, net.plain()));
         }
         events.push(Scalars {
@@ -72,7 +72,10 @@ fn fit(
         progress.advance(1);
     }
     progress.end();
-    let inference = best.map_or_else(|| net.plain(), |(_, kept)| kept);
+    let Some((_, inference)) = best else {
+        let message = "the training of the estimator diverged; lower identifier.learning_rate";
+        return Err(Error::Failed(message.into()));
+    };
     Ok(Fitted { inference, events })
 }
 
@@ -225,5 +228,23 @@ mod tests {
                 .inference
         };
         assert_eq!(once(), once());
+    }
+
+    /// Symptom: a training whose first epoch diverged gave a network of NaN, in a file that could
+    /// not be read back. Cause: no later loss is below NaN.
+    #[test]
+    fn a_training_that_diverges_says_so() {
+        let prior = parameter(Scale::Linear);
+        let settings = Estimator {
+            hidden: vec![8],
+            epochs: 2,
+            minibatch: 16,
+            learning_rate: 1e30,
+            ..Estimator::default()
+        };
+        let data = episodes(200, 2, 0.5, &prior, 1);
+        let found = fit(&settings, &[prior], [&data, &data], 7, &Silent);
+        let message = found.err().unwrap().to_string();
+        assert!(message.contains("identifier.learning_rate"), "{message}");
     }
 }

@@ -264,7 +264,7 @@ fn settle(
         tick();
         let Some((fit, told)) = fit.and_then(|f| f.told(settings.correlated).map(|t| (f, t)))
         else {
-            return Ok(found);
+            break;
         };
         let (next, whole) = moved(&fit, &told, &point, &factor, space);
         // Residuals after the step, by the linear model.

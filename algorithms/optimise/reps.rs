@@ -40,14 +40,21 @@ pub fn dual(eta: f64, epsilon: f64, rewards: &[f64]) -> f64 {
 }
 
 /// The temperature that minimises the dual, by golden-section search on its logarithm.
+///
+/// At a thousandth of the distance from the best reward to the next one all weight is on the best;
+/// at a thousand times the spread all draws weigh alike. The minimum lies between.
 #[must_use]
 pub fn temperature(epsilon: f64, rewards: &[f64]) -> f64 {
     let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let min = rewards.iter().copied().fold(f64::INFINITY, f64::min);
-    let spread = (max - min).max(1e-12);
+    // Relative to the best, so that a large constant takes no digits from small differences.
+    let rewards: Vec<f64> = rewards.iter().map(|j| j - max).collect();
+    let spread = rewards.iter().fold(1e-12, |s: f64, j| s.max(-j));
+    let worse = rewards.iter().filter(|j| **j < 0.0);
+    let nearest = worse.fold(spread, |s, j| s.min(-j));
     let ratio = (5_f64.sqrt() - 1.0) / 2.0;
-    let (mut a, mut b) = ((spread * 1e-6).ln(), (spread * 1e3).ln());
-    let f = |x: f64| dual(x.exp(), epsilon, rewards);
+    let least = (nearest * 1e-3).max(f64::MIN_POSITIVE);
+    let (mut a, mut b) = (least.ln(), (spread * 1e3).ln());
+    let f = |x: f64| dual(x.exp(), epsilon, &rewards);
     let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
     let (mut fc, mut fd) = (f(c), f(d));
     for _ in 0..100 {
@@ -137,6 +144,26 @@ mod tests {
             .map(|p| p * (p * 200.0).ln())
             .sum();
         assert!((kl - 0.5).abs() < 1e-3, "{kl}");
+    }
+
+    /// Symptom: after one draw that flew off, with a cost of 10^12, a refit followed no other
+    /// difference. Cause: temperatures below a millionth of the spread were not searched.
+    #[test]
+    fn one_terrible_draw_does_not_blind_the_others() {
+        for max in [0.0, 1e9] {
+            let mut rewards: Vec<f64> = (0..200).map(|i| max - 0.01 * f64::from(i * i)).collect();
+            rewards.push(max - 1e12);
+            let eta = temperature(0.5, &rewards);
+            let w: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
+            let total: f64 = w.iter().sum();
+            let kl: f64 = w
+                .iter()
+                .map(|w| w / total)
+                .filter(|p| *p > 0.0)
+                .map(|p| p * (p * 201.0).ln())
+                .sum();
+            assert!((kl - 0.5).abs() < 1e-3, "{kl}");
+        }
     }
 
     #[test]

@@ -92,10 +92,14 @@ impl<R: UpdateRule> Search<R> {
     }
 }
 
+/// A cost as it is ranked: NaN, of either sign, ranks last, with the failures.
+pub(crate) fn rank(cost: f64) -> f64 {
+    if cost.is_nan() { f64::INFINITY } else { cost }
+}
+
 /// Indices of the costs, best first; NaN ranks last, with the failures.
 pub(super) fn ranked(costs: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
-    let rank = |c: f64| if c.is_nan() { f64::INFINITY } else { c };
     order.sort_by(|&i, &j| rank(costs[i]).total_cmp(&rank(costs[j])));
     order
 }

@@ -11,6 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Attempts;
+use crate::optimise::search::rank;
 use crate::optimise::{Cem, CemSettings};
 
 /// Settings of the solver.
@@ -96,8 +97,7 @@ impl TaskSolver for CemSolver {
             let situations = attempts.draw(samples, &mut rng)?;
             let costs = attempts.mean_costs(&situations, &actions)?;
             pool.extend(actions.iter().cloned().zip(costs.iter().copied()));
-            pool.sort_by(|a, b| a.1.total_cmp(&b.1));
-            pool.truncate(self.population);
+            keep_best(&mut pool, self.population);
             let (best, best_costs): (Vec<_>, Vec<_>) = pool.iter().cloned().unzip();
             cem.tell(&best, &best_costs);
             trials.extend(actions.into_iter().zip(costs).map(|(action, cost)| Trial {
@@ -115,6 +115,12 @@ impl TaskSolver for CemSolver {
             trials,
         })
     }
+}
+
+/// Keeps the `most` actions with the lowest costs, lowest first; failures come last.
+fn keep_best(pool: &mut Vec<(Vec<f64>, f64)>, most: usize) {
+    pool.sort_by(|a, b| rank(a.1).total_cmp(&rank(b.1)));
+    pool.truncate(most);
 }
 
 /// Share of the spread between best and median cost within which actions count as equally good.
@@ -164,4 +170,19 @@ fn settled(
     } else {
         best.to_vec()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: of a task whose cost is minus a height, the solver kept the attempts that diverged.
+    /// Cause: minus NaN sorts before every number.
+    #[test]
+    fn an_attempt_that_diverged_is_never_the_best() {
+        let costs = [-f64::NAN, 0.5, f64::INFINITY, -2.0, f64::NAN];
+        let mut pool: Vec<(Vec<f64>, f64)> = costs.iter().map(|c| (vec![*c], *c)).collect();
+        keep_best(&mut pool, 2);
+        assert_eq!(pool, [(vec![-2.0], -2.0), (vec![0.5], 0.5)]);
+    }
 }

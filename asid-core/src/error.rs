@@ -159,7 +159,15 @@ fn suggestion(kind: &str, near: &[String], all: bool) -> String {
     match &*quoted {
         [] => String::new(),
         [one] => format!("; did you mean {one}?"),
-        many if all => format!("; known: {}", many.join(", ")),
+        many if all => {
+            // What is listed may be a plugin's, and is unknown where that is not loaded.
+            let more = if LISTED.contains(&kind) {
+                "; one of a plugin takes --plugin FILE"
+            } else {
+                ""
+            };
+            format!("; known: {}{more}", many.join(", "))
+        }
         [first @ .., last] => {
             let rest = if LISTED.contains(&kind) {
                 " (`asid list` has all)"
@@ -249,7 +257,7 @@ mod tests {
         let error = Error::unknown("backend", "zzz", ["mujoco", "rapier"]);
         assert_eq!(
             error.to_string(),
-            "unknown backend `zzz`; known: `mujoco`, `rapier`"
+            "unknown backend `zzz`; known: `mujoco`, `rapier`; one of a plugin takes --plugin FILE"
         );
     }
 

@@ -15,15 +15,15 @@ use crate::error::{Error, Result};
 /// | `geom/NAME/friction/{0,1,2}` | sliding, torsional (m), rolling (m) friction | 1, m, m |
 /// | `geom/NAME/pos/{0,1,2}` | place in its body; mass properties follow | m |
 /// | `geom/NAME/mass` | mass; its body's mass properties follow | kg |
-/// | `geom/NAME/solref/{0,1}` | contact softness: time constant (s), damping ratio | s, 1 |
+/// | `geom/NAME/solref/{0,1}` | contact softness: time constant (s), damping ratio; MuJoCo | s, 1 |
 /// | `body/NAME/mass` | mass, the inertia scaled with it | kg |
 /// | `body/NAME/ipos/{0,1,2}` | centre of mass in its body | m |
 /// | `body/NAME/inertia/{0,1,2}` | principal moments | kg m² |
 /// | `joint/NAME/pos/{0,1,2}` | anchor of a hinge in its body; joint coordinates stay | m |
 /// | `joint/NAME/damping`, `frictionloss`, `stiffness`, `armature` | per degree of freedom | SI |
 /// | `actuator/NAME/kp`, `kv`, `gear` | gains of a servo, ratio of a drive | SI |
-/// | `body/NAME/pos/{0,1,2}` | place in its parent, of a body that is not free; MuJoCo | m |
-/// | `joint/NAME/axis/{0,1,2}` | axis of a hinge or slide, scaled to length 1; MuJoCo | 1 |
+/// | `body/NAME/pos/{0,1,2}` | place in its parent, of a body that is not free | m |
+/// | `joint/NAME/axis/{0,1,2}` | axis of a hinge or slide, scaled to length 1 | 1 |
 /// | `joint/NAME/range/{0,1}`, `springref` | limits, rest of the spring; MuJoCo | rad or m |
 /// | `actuator/NAME/forcerange/{0,1}` | limits of the force, before the gear; MuJoCo | N or N m |
 /// | `option/gravity/{0,1,2}` | gravity | m/s² |

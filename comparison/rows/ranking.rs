@@ -15,12 +15,21 @@ pub struct Entry<'a> {
     pub summary: &'a mut Summary,
 }
 
-/// Fewest runs with which a bootstrap interval may set a method apart. The interval cannot reach
-/// beyond the observed values, and only from six runs on do these enclose the median with 95 % (1 -
-/// 2 / 2^6 = 97 %).
+/// Fewest runs of each condition with which a bootstrap interval may set a method apart. The
+/// interval cannot reach beyond the observed values, and only from six runs on do these enclose the
+/// median with 95 % (1 - 2 / 2^6 = 97 %).
 pub const FEWEST: usize = 6;
 
+/// Whether there are enough runs in each stratum. A stratum is resampled by itself, so runs of
+/// others do not make up for too few in one.
+fn measured(entry: &Entry<'_>) -> bool {
+    entry.values.iter().all(|of| of.len() >= FEWEST)
+}
+
 /// Compares methods with each other. The oracle is left out: it shows what the task allows.
+///
+/// A method is the best if its interval is apart from that of every other one. Apart from the next
+/// one's is not enough, since the interval of a method further down may be wider.
 pub fn compare(mut entries: Vec<Entry<'_>>) {
     entries.retain(|e| e.method != ORACLE);
     // Lower is better; among equals the method that succeeds more often.
@@ -37,15 +46,21 @@ pub fn compare(mut entries: Vec<Entry<'_>>) {
             interval95: improvement_interval(&better.values, &next.values),
         });
     }
-    if let [first, second, ..] = &mut *entries {
-        let enough = first.summary.n.min(second.summary.n) >= FEWEST;
-        let apart = first.summary.iqm_interval95[1] < second.summary.iqm_interval95[0];
-        first.summary.best.iqm = enough && apart;
+    if let [first, others @ ..] = &mut *entries
+        && !others.is_empty()
+    {
+        let high = first.summary.iqm_interval95[1];
+        let behind = |other: &Entry<'_>| high < other.summary.iqm_interval95[0];
+        let best = measured(first) && others.iter().all(|o| measured(o) && behind(o));
+        first.summary.best.iqm = best;
     }
     entries.sort_by(|a, b| b.summary.success_rate.total_cmp(&a.summary.success_rate));
-    if let [first, second, ..] = &mut *entries {
-        let apart = first.summary.success_interval95[0] > second.summary.success_interval95[1];
-        first.summary.best.success = apart;
+    if let [first, others @ ..] = &mut *entries
+        && !others.is_empty()
+    {
+        let low = first.summary.success_interval95[0];
+        let behind = |other: &Entry<'_>| low > other.summary.success_interval95[1];
+        first.summary.best.success = others.iter().all(behind);
     }
 }
 

@@ -45,6 +45,59 @@ fn the_best_is_marked_only_where_its_interval_is_apart() {
     assert!(alike.rows.iter().all(|r| r.summary.best == Best::default()));
 }
 
+/// Symptom: the best method was set in bold although the interval of the third held its value.
+/// Cause: its interval was held against the next method's alone.
+#[test]
+fn the_best_is_apart_from_every_other_method_and_not_from_the_next_alone() {
+    // Half of the last method's runs are better than those of the first, and its interval says so.
+    let halves = [[0.0; 5], [9.0; 5]].concat();
+    let all = [
+        cells("x", "asid", &[1.0; 10]),
+        cells("x", "random", &[2.0; 10]),
+        cells("x", "dr", &halves),
+    ];
+    let best = |result: &ComparisonResult| result.rows[0].summary.best;
+    assert!(!best(&summed(&all.concat())).iqm);
+    assert!(best(&summed(&all[..2].concat())).iqm);
+    // 10 of 10 is apart from 4 of 10 (17 to 69 %), and not from 1 of 3 (6 to 79 %).
+    let some = [[1.0; 4].to_vec(), [9.0; 6].to_vec()].concat();
+    let all = [
+        cells("x", "asid", &[1.0; 10]),
+        cells("x", "random", &some),
+        cells("x", "dr", &[1.0, 9.0, 9.0]),
+    ];
+    assert!(!best(&summed(&all.concat())).success);
+    assert!(best(&summed(&all[..2].concat())).success);
+}
+
+/// Symptom: three runs in each of two conditions made a method the best over all conditions, where
+/// six in one are asked for. Cause: the runs of all conditions were counted together, though each
+/// condition is resampled by itself.
+#[test]
+fn over_all_conditions_each_needs_the_fewest_runs() {
+    let best = |n: usize| {
+        let runs = |condition: &str, method: &str, value: f64| {
+            let values = vec![value; n];
+            cells(condition, method, &values)
+        };
+        let all = ["x", "y"].map(|c| [runs(c, "asid", 0.0), runs(c, "dr", 9.0)].concat());
+        summed(&all.concat()).pooled[0].summary.best.iqm
+    };
+    assert!(!best(FEWEST / 2) && !best(FEWEST - 1) && best(FEWEST));
+}
+
+/// Symptom: a row of ten runs said nothing of what was identified. Cause: the residual of its first
+/// run was not finite, which its file writes as it writes none.
+#[test]
+fn a_row_whose_first_residual_is_lost_says_what_was_identified() {
+    let mut all = cells("x", "asid", &[0.0; 3]);
+    all[0].residual = None;
+    all.extend(cells("x", "dr", &[0.0; 3]));
+    let result = summed(&all);
+    let found = result.rows.iter().map(|r| r.identification.len());
+    assert_eq!(found.collect::<Vec<_>>(), [1, 0]);
+}
+
 #[test]
 fn fewer_runs_and_other_budgets_are_said_of_a_row() {
     let mut all = [

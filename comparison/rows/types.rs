@@ -34,7 +34,7 @@ pub struct Improvement {
     pub interval95: [f64; 2],
 }
 
-/// Whether a row is the best of its column, with an interval apart from the next one's.
+/// Whether a row is the best of its column, with an interval apart from the others'.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Best {
     /// In the interquartile mean of the metric.

@@ -137,6 +137,9 @@ impl Columns {
     /// Computes the columns of a fitted model's unknowns and of all candidates along its
     /// trajectory.
     ///
+    /// The trajectory is that of the first estimate. The missing force of the second one gives the
+    /// widths of the candidates' priors.
+    ///
     /// If the work is stopped, it includes only the candidates that there was time for. With many
     /// segments, all candidates are computed along a part of them. Those that lead there according
     /// to `leads` (one flag per candidate) are computed along the rest too; the others' columns are
@@ -147,7 +150,7 @@ impl Columns {
     pub fn of(
         context: &Context<'_>,
         (base, theta): (&Hypothesis, &[f64]),
-        estimate: &Estimate,
+        (estimate, lacking): (&Estimate, &Estimate),
         (candidates, leads): (&[Candidate], Leads<'_>),
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -192,7 +195,7 @@ impl Columns {
         let (sizes, felt) = if context.has_segments() {
             (sizes_by_range(candidates, &trials), true)
         } else {
-            sizes(context, estimate, &source, &trials)?
+            sizes(context, (estimate, lacking), &source, &trials)?
         };
         asked.add(candidates, &sizes, context.has_segments());
         let [first, others] = in_part::parts(context);
@@ -213,7 +216,8 @@ impl Columns {
         let more = wanted.len();
         let mut factors = vec![1.0; more];
         if context.has_segments() {
-            factors = sizes_along((context, estimate), &linear, (&found, &first), more);
+            let estimates = (estimate, lacking);
+            factors = sizes_along((context, estimates), &linear, (&found, &first), more);
             for form in &mut forms {
                 resize(form, candidates, (&mut factors, base), &mut bounds);
             }

@@ -10,7 +10,7 @@ use crate::machine::Machine;
 use crate::predict::State;
 
 use super::estimate::Estimate;
-use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
+use super::initial::{open_by_reading, position_noise, start, start_of_segment};
 use super::islands::Islands;
 use super::one_step::both_ways;
 use super::smoother::{NoiseModel, Start};
@@ -80,8 +80,8 @@ pub struct Taken {
     pub given: Vec<Option<State>>,
     /// Tangent coordinates of the initial states that logs leave open.
     pub open: Vec<usize>,
-    /// States for coordinates that no sensor reads, `rows x (nq + nv)`, one a walk.
-    pub otherwise: Vec<Vec<f64>>,
+    /// States by the readings of the whole logs, `rows x (nq + nv)`, one a walk.
+    pub states: Vec<Vec<f64>>,
     /// Largest magnitude of each tangent coordinate.
     pub scale: Vec<f64>,
     /// Pairs of bodies that touch in some row.
@@ -281,7 +281,7 @@ pub fn begin<'a>(
     let plant = &machine.plant;
     let layout = &plant.layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
-    let mut trajectory = from_readings(plant, logs, &taken.walks, &taken.otherwise);
+    let mut trajectory = taken.states;
     let read: Vec<Vec<f64>> = trajectory.iter().map(|s| s[..width].to_vec()).collect();
     let (noise, alike) = (logs.entry_noise(), logs.entry_alike());
     let mut context = Context {
@@ -338,6 +338,7 @@ pub fn begin<'a>(
         misled: vec![1.0; trajectory.len()],
         rolls: 0,
         least_white: vec![0.0; nv],
+        told: vec![true; nv],
         smoothed: Vec::new(),
         log_likelihood: f64::NEG_INFINITY,
         trajectory,

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::context::Context;
-use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth};
+use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth, told};
 use super::step_map::LinearEpisode;
 use super::tangent::{part_way, retract};
 use super::walk::Walk;
@@ -49,6 +49,11 @@ pub struct Estimate {
     pub scatter: Vec<Vec<f64>>,
     /// Smallest variance of the white part of each force.
     pub least_white: Vec<f64>,
+    /// Whether readings along the smoothed walks tell of the force at each degree of freedom, in
+    /// this model and in those that it was fitted from.
+    ///
+    /// The variances of any other force stay where they are put: nothing estimates them.
+    pub told: Vec<bool>,
     /// For each segment: variance of its residuals relative to that of the readings; 1 for other
     /// walks.
     pub excess: Vec<f64>,
@@ -184,6 +189,16 @@ impl Estimate {
         }
         let layout = &context.plant().layout;
         let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
+        let each: Vec<Vec<bool>> = self
+            .problems(context, linear, &starts)
+            .filter(|problem| problem.walk.segment.is_none())
+            .map(|problem| told(problem, &self.noise))
+            .collect();
+        if !each.is_empty() {
+            for (dof, own) in self.told.iter_mut().enumerate() {
+                *own &= each.iter().any(|told| told[dof]);
+            }
+        }
         let pairs = self.trajectory.iter_mut().zip(&self.smoothed);
         for ((states, smoothed), walk) in pairs.zip(&context.walks) {
             let changes = smoothed.change.chunks_exact(nx).take(moved(walk));

@@ -1,19 +1,21 @@
 //! First trajectory from the readings, and priors of the initial states.
 
+mod of_state;
+
 use std::ops::Range;
 
-use asid_core::layout::JointKind;
 use asid_core::signal::{rotation_difference, unit_quaternion};
 use asid_mjcf::Plant;
-use asid_mjcf::plant::Reads;
 use nalgebra::Vector3;
 
 use crate::data::Logs;
 use crate::predict::State;
 
 use super::smoother::Start;
-use super::tangent::difference;
+use super::tangent::{difference, rotation};
 use super::walk::Walk;
+
+use of_state::OfState;
 
 /// Half the number of rows over which a speed is taken.
 const HALF_WINDOW: usize = 2;
@@ -78,7 +80,8 @@ fn align_signs(series: &mut [Vec<f64>]) {
 /// Returns trajectories along some walks, `rows x (nq + nv)` each.
 ///
 /// Coordinates that sensors of joints and of free bodies read are taken from the readings. Speeds
-/// that no sensor reads are differences of positions. The rest comes from `otherwise`.
+/// that no sensor reads are differences of positions, if these are read. The rest comes from
+/// `otherwise`.
 #[must_use]
 pub fn from_readings(
     plant: &Plant,
@@ -86,27 +89,40 @@ pub fn from_readings(
     walks: &[Walk],
     otherwise: &[Vec<f64>],
 ) -> Vec<Vec<f64>> {
+    let layout = &plant.layout;
     let mut out = otherwise.to_vec();
     for (walk, states) in walks.iter().zip(&mut out) {
-        let mut read = Read::nothing(plant.layout.nv);
+        let mut read = Read::nothing(layout.nv);
+        let mut spins = Vec::new();
         let mut first = 0;
         for sensor in &logs.sensors {
-            let sensors = &plant.layout.sensors;
+            let sensors = &layout.sensors;
             let Some(index) = sensors.iter().position(|s| s.name == sensor.name) else {
                 continue;
             };
             let channels = first..first + sensors[index].len;
             first = channels.end;
+            let Some(of) = OfState::of(plant, index) else {
+                continue;
+            };
             let mut series = series(logs, walk, channels);
-            if sensors[index].kind == "framequat" {
+            if matches!(of, OfState::Turn(..)) {
                 align_signs(&mut series);
             }
-            if series.iter_mut().all(|s| fill(&walk.time, s)) {
-                read.take(plant, index, &series, states);
+            if !series.iter_mut().all(|s| fill(&walk.time, s)) {
+                continue;
+            }
+            match of {
+                OfState::Spin(..) => spins.push((of, series)),
+                _ => read.take((of, &series), states, layout.nq),
             }
         }
+        // About a body's own axes, so once its orientation is known.
+        for (of, series) in &spins {
+            read.take((*of, series), states, layout.nq);
+        }
         speeds(plant, walk, &read, states);
-        spin(plant, walk, &read.places, states);
+        spin(plant, walk, &read, states);
     }
     out
 }
@@ -137,46 +153,34 @@ impl Read {
         }
     }
 
-    /// Writes the readings of a sensor into the states of a walk, if it reads a joint or a free
-    /// body.
-    fn take(&mut self, plant: &Plant, sensor: usize, series: &[Vec<f64>], states: &mut [f64]) {
-        let layout = &plant.layout;
-        let rows = states.chunks_exact_mut(layout.nq + layout.nv).enumerate();
-        let kind = &*layout.sensors[sensor].kind;
-        match plant.sensors[sensor] {
-            Reads::Joint(j) => {
-                let joint = &layout.joints[j];
-                let is_scalar = matches!(joint.kind, JointKind::Hinge | JointKind::Slide);
-                let (read, place) = match kind {
-                    "jointpos" if is_scalar => (&mut self.places, joint.qpos),
-                    "jointvel" if is_scalar => (&mut self.speeds, layout.nq + joint.qvel),
-                    _ => return,
-                };
-                read[joint.qvel] = true;
-                rows.for_each(|(k, row)| row[place] = series[0][k]);
-            }
-            Reads::Body(b) => {
-                let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
-                    return;
-                };
-                let (place, dof) = match kind {
-                    "framepos" => (joint.qpos, joint.qvel),
-                    "framequat" => (joint.qpos + 3, joint.qvel + 3),
-                    _ => return,
-                };
-                self.places[dof..dof + 3].fill(true);
-                for (k, row) in rows {
-                    let values: Vec<f64> = series.iter().map(|s| s[k]).collect();
-                    if kind == "framequat" {
-                        let q = unit_quaternion(&values);
-                        row[place..place + 4].copy_from_slice(&[q.w, q.i, q.j, q.k]);
-                    } else {
-                        row[place..place + 3].copy_from_slice(&values);
-                    }
+    /// Writes the readings of a sensor into the states of a walk, whose speeds begin at `nq`.
+    fn take(&mut self, (of, series): (OfState, &[Vec<f64>]), states: &mut [f64], nq: usize) {
+        let nv = self.places.len();
+        for (k, row) in states.chunks_exact_mut(nq + nv).enumerate() {
+            let values: Vec<f64> = series.iter().map(|s| s[k]).collect();
+            let (at, values) = match of {
+                OfState::Places(place, _) => (place, values),
+                OfState::Turn(place, _) => {
+                    let q = unit_quaternion(&values);
+                    (place, vec![q.w, q.i, q.j, q.k])
                 }
-            }
-            Reads::Other => {}
+                OfState::Speeds(dof) => (nq + dof, values),
+                OfState::Spin(place, dof) => {
+                    let turn = unit_quaternion(&row[place..place + 4]);
+                    let own = turn.inverse() * Vector3::from_column_slice(&values);
+                    (nq + dof, own.as_slice().to_vec())
+                }
+            };
+            row[at..at + values.len()].copy_from_slice(&values);
         }
+        let read = match of {
+            OfState::Places(_, dof) => &mut self.places[dof..dof + series.len()],
+            OfState::Turn(_, dof) => &mut self.places[dof..dof + 3],
+            OfState::Speeds(dof) | OfState::Spin(_, dof) => {
+                &mut self.speeds[dof..dof + series.len()]
+            }
+        };
+        read.fill(true);
     }
 }
 
@@ -201,14 +205,15 @@ fn speeds(plant: &Plant, walk: &Walk, read: &Read, states: &mut [f64]) {
     }
 }
 
-/// Fills in the angular speeds of free bodies about their own axes, from their orientations.
-fn spin(plant: &Plant, walk: &Walk, read: &[bool], states: &mut [f64]) {
+/// Fills in angular speeds that no sensor reads, of free bodies and ball joints about their own
+/// axes, from their orientations.
+fn spin(plant: &Plant, walk: &Walk, read: &Read, states: &mut [f64]) {
     let layout = &plant.layout;
     let width = layout.nq + layout.nv;
     let n = walk.len();
     let places = states.to_vec();
-    for joint in layout.joints.iter().filter(|j| j.kind == JointKind::Free) {
-        if !read[joint.qvel + 3] {
+    for (place, dof) in layout.joints.iter().filter_map(rotation) {
+        if !read.places[dof] || read.speeds[dof] {
             continue;
         }
         for k in 0..n {
@@ -217,10 +222,10 @@ fn spin(plant: &Plant, walk: &Walk, read: &[bool], states: &mut [f64]) {
             if dt <= 0.0 {
                 continue;
             }
-            let q = |k: usize| &places[k * width + joint.qpos + 3..k * width + joint.qpos + 7];
+            let q = |k: usize| &places[k * width + place..k * width + place + 4];
             let turn = Vector3::from(rotation_difference(q(b), q(a)));
             let own = unit_quaternion(q(k)).inverse() * turn / dt;
-            let at = k * width + layout.nq + joint.qvel + 3;
+            let at = k * width + layout.nq + dof;
             states[at..at + 3].copy_from_slice(own.as_slice());
         }
     }
@@ -274,17 +279,13 @@ pub fn position_entries(plant: &Plant, logs: &Logs) -> Vec<Option<usize>> {
 
 /// Returns the degrees of freedom whose positions a sensor reads directly.
 fn positions_read(plant: &Plant, sensor: &str) -> Range<usize> {
-    let layout = &plant.layout;
-    let Some(index) = layout.sensors.iter().position(|s| s.name == sensor) else {
+    let sensors = &plant.layout.sensors;
+    let Some(index) = sensors.iter().position(|s| s.name == sensor) else {
         return 0..0;
     };
-    match (plant.sensors[index], &*layout.sensors[index].kind) {
-        (Reads::Joint(j), "jointpos") => layout.joints[j].qvel..layout.joints[j].qvel + 1,
-        (Reads::Body(b), kind) => match plant.free_joint(b).map(|j| layout.joints[j].qvel) {
-            Some(first) if kind == "framepos" => first..first + 3,
-            Some(first) if kind == "framequat" => first + 3..first + 6,
-            _ => 0..0,
-        },
+    match OfState::of(plant, index) {
+        Some(OfState::Places(_, dof)) => dof..dof + sensors[index].len,
+        Some(OfState::Turn(_, dof)) => dof..dof + 3,
         _ => 0..0,
     }
 }

@@ -86,10 +86,9 @@ pub(super) fn left(context: &Context<'_>, outcome: &Outcome) -> Vec<Left> {
                 course(series(context, outcome, &[], (&dofs[d], d), &rows))
             })
             .collect();
-        let missing = estimate.noise.q[d] + estimate.noise.white[d];
         Left {
             place: dofs[d].name.clone(),
-            weight: missing / context.inertial[d].powi(2),
+            weight: estimate.missing_power(context, d),
             foretold: learn(&courses),
         }
     };

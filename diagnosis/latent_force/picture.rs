@@ -132,10 +132,11 @@ fn law(
 }
 
 /// The degrees of freedom that lack the most force relative to their inertial force, largest first.
+///
+/// Those of whose force no reading tells come last, and only if there are no others.
 pub(super) fn most_missing_of(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
-    let noise = &estimate.noise;
-    let missing = |d: usize| (noise.q[d] + noise.white[d]).sqrt() / context.inertial[d];
-    let mut order: Vec<usize> = (0..noise.q.len()).collect();
+    let missing = |d: usize| estimate.missing_power(context, d).sqrt();
+    let mut order: Vec<usize> = (0..estimate.noise.q.len()).collect();
     order.sort_by(|&a, &b| missing(b).total_cmp(&missing(a)));
     let most = order.first().map_or(0.0, |&d| missing(d));
     order.retain(|&d| missing(d) >= LEAST * most);

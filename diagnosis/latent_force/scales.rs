@@ -183,7 +183,8 @@ pub fn settled(
     own
 }
 
-/// The degrees of freedom that lack the most force relative to their inertial force.
+/// The degrees of freedom that lack the most force relative to their inertial force, among those of
+/// whose force readings tell.
 ///
 /// Returns none if there is only one, since common scales do the same. Returns none if there are
 /// segments, since their replays have no missing force.
@@ -192,9 +193,8 @@ fn lacking(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
     if context.has_segments() || nv < 2 {
         return Vec::new();
     }
-    let share =
-        |d: usize| (estimate.noise.q[d] + estimate.noise.white[d]) / context.inertial[d].powi(2);
-    let mut dofs: Vec<usize> = (0..nv).collect();
+    let share = |d: usize| estimate.missing_power(context, d);
+    let mut dofs: Vec<usize> = (0..nv).filter(|&d| estimate.told[d]).collect();
     dofs.sort_by(|a, b| share(*b).total_cmp(&share(*a)));
     dofs.truncate(JOINTS);
     dofs

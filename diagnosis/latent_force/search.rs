@@ -23,6 +23,7 @@ mod prune;
 mod race;
 mod replayed_order;
 mod round;
+mod savage_dickey;
 mod screening;
 mod second_look;
 mod set;
@@ -36,7 +37,7 @@ use crate::chance::threshold;
 use crate::settings::Breadth;
 
 use super::context::Context;
-use super::estimate::Missing;
+use super::estimate::{Estimate, Missing};
 use super::fit::Fitted;
 
 pub use names::Names;
@@ -193,7 +194,8 @@ struct Search<'s> {
     breadth: Breadth,
     open_loop: OpenLoop<'s>,
     progress: &'s dyn Progress,
-    /// What is missing without effects.
+    /// The estimate without effects, and what is missing there.
+    without: &'s Estimate,
     at_first: Missing,
     /// Evidence by which a name must exceed the set that stands.
     threshold: f64,
@@ -226,6 +228,7 @@ pub fn search(
         breadth,
         open_loop,
         progress,
+        without: &none.estimate,
         at_first: none.estimate.missing(context),
         threshold: threshold(nameable(candidates), breadth.false_alarms),
     };

@@ -13,6 +13,11 @@
 //! A segment begins some rows before its readings count. Over these rows the contact settles, and
 //! effects build up their memory. An error of the initial state in a direction that a contact
 //! blocks decays as it does in the machine.
+//!
+//! No segment leads over rows that are missing for longer than it lasts itself. A log does not say
+//! what its machine did meanwhile, and a replay over them would cost the readings on both sides.
+
+use crate::noise::median;
 
 use super::walk::Walk;
 
@@ -122,9 +127,42 @@ fn segments(walk: &Walk, range: std::ops::Range<usize>, duration: f64, out: &mut
 /// Cuts rows at some times, s, into pieces of about a duration, s; returns the first row of each,
 /// and last the number of rows.
 ///
-/// No piece has fewer than [`FEWEST`] rows, unless there are fewer. So pieces are longer where rows
-/// are missing.
+/// No piece has fewer than [`FEWEST`] rows, unless there are fewer. So pieces are longer where a
+/// few rows are missing.
 fn pieces(time: &[f64], duration: f64) -> Vec<usize> {
+    let mut firsts = Vec::new();
+    for pair in stretches(time, duration).windows(2) {
+        let own = evenly(&time[pair[0]..pair[1]], duration);
+        firsts.extend(own.into_iter().map(|first| pair[0] + first));
+    }
+    firsts.push(time.len());
+    firsts
+}
+
+/// Cuts rows where they are missing for longer than a segment of a duration, s, lasts; returns the
+/// first row of each stretch, and last the number of rows.
+///
+/// A segment lasts at least as long as [`FEWEST`] rows usually do. A stretch of fewer rows stays
+/// with the one before.
+fn stretches(time: &[f64], duration: f64) -> Vec<usize> {
+    let rows = time.len();
+    let mut seconds: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
+    let usual = median(&mut seconds).unwrap_or(0.0);
+    let longest = duration.max(FEWEST as f64 * usual);
+    let mut firsts = vec![0];
+    for k in FEWEST..rows {
+        let begun = firsts[firsts.len() - 1];
+        let is_missing = time[k] - time[k - 1] > longest;
+        if is_missing && k >= begun + FEWEST && k + FEWEST <= rows {
+            firsts.push(k);
+        }
+    }
+    firsts.push(rows);
+    firsts
+}
+
+/// Cuts rows at some times, s, into pieces of about a duration, s; returns the first row of each.
+fn evenly(time: &[f64], duration: f64) -> Vec<usize> {
     let rows = time.len();
     let seconds = time[rows - 1] - time[0];
     let n = (seconds / duration).round() as usize;
@@ -139,7 +177,6 @@ fn pieces(time: &[f64], duration: f64) -> Vec<usize> {
             firsts.push(first);
         }
     }
-    firsts.push(rows);
     firsts
 }
 
@@ -257,6 +294,36 @@ mod tests {
             let touches: Vec<bool> = (0..20).map(|k| k == touching).collect();
             assert_covers(&walk, &cut(&walk, &touches, 0.25));
         }
+    }
+
+    /// Symptom: readings on both sides of a dropout decided nothing. Cause: a segment was replayed
+    /// over it, under a command that the machine may not have held.
+    #[test]
+    fn no_segment_leads_over_a_dropout() {
+        // Two seconds are missing after 0.3 s, and half a second after 0.6 s.
+        let missing = |k: usize| match k {
+            0..30 => 0.0,
+            30..60 => 2.0,
+            _ => 2.5,
+        };
+        let walk = at((0..100).map(|k| 0.01 * k as f64 + missing(k)).collect());
+        let longest = |duration: f64| {
+            let parts = cut(&walk, &[true; 100], duration);
+            assert_covers(&walk, &parts);
+            let rows = parts.iter().flat_map(|p| p.time.windows(2));
+            rows.map(|t| t[1] - t[0]).fold(0.0, f64::max)
+        };
+        assert!(longest(0.25) < 0.011, "{}", longest(0.25));
+        // Half a second is within a segment of a second.
+        assert!((longest(1.0) - 0.51).abs() < 1e-9, "{}", longest(1.0));
+        assert!((longest(f64::INFINITY) - 2.01).abs() < 1e-9);
+        // Three rows before a dropout are too few for a segment.
+        let early = |k: usize| 0.01 * k as f64 + if k < 3 { 0.0 } else { 2.0 };
+        let time: Vec<f64> = (0..40).map(early).collect();
+        assert_eq!(stretches(&time, 0.25), [0, 40]);
+        // Rows that are all far apart are no dropouts.
+        let time: Vec<f64> = (0..20).map(f64::from).collect();
+        assert_eq!(pieces(&time, 0.25), [0, 4, 8, 12, 16, 20]);
     }
 
     /// Symptom: logs were replayed from the state of another log. Cause: where rows are missing,

@@ -215,6 +215,17 @@ impl Regression {
     }
 }
 
+/// Returns whether the readings of an episode tell of the force at each degree of freedom.
+///
+/// The episode is no segment.
+///
+/// They do if one that is present depends on a coordinate that the force moves, directly or over
+/// others.
+#[must_use]
+pub fn told(problem: Problem<'_>, noise: &NoiseModel) -> Vec<bool> {
+    blocks::told(problem, noise)
+}
+
 /// Returns the log-likelihood of an episode that is not a segment.
 #[must_use]
 pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {

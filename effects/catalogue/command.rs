@@ -7,7 +7,7 @@ use asid_mjcf::Plant;
 use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::{Drive, DriveLaw, ForceLimit};
 
-use super::drive::{DriveAt, gains};
+use super::drive::{LimitedAt, gains};
 use super::{actuators, at_least, drives, target, values};
 
 crate::register!(EffectEntry {
@@ -120,28 +120,8 @@ pub(super) const UNLIMITED: f64 = 1000.0;
 
 /// Holds the force on the joint, gear included, within `±limit`.
 ///
-/// The force that the drive asks for at the start of a step decides: see [`DriveAt::hold`].
+/// The force that the drive asks for at the start of a step decides: see [`LimitedAt`].
 struct Saturation;
-
-struct SaturationAt {
-    drive: DriveAt,
-    damping: usize,
-    limit: f64,
-}
-
-impl Acting for SaturationAt {
-    fn set(&self, columns: &mut [f64]) {
-        self.drive.set(columns);
-    }
-
-    fn before_step(&mut self, view: &mut StepView<'_>) {
-        let force = self.drive.force(view);
-        if force.abs() > self.limit {
-            self.drive
-                .hold(view, self.limit.copysign(force), self.damping);
-        }
-    }
-}
 
 impl Effect for Saturation {
     fn acts(&self) -> Acts {
@@ -187,11 +167,11 @@ impl Effect for Saturation {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [limit] = values(site)?;
-        Ok(Box::new(SaturationAt {
-            drive: DriveAt::of_site(site, 1)?,
-            damping: site.columns[0],
-            limit: at_least(site, "limit", limit, 0.0)?,
-        }))
+        let own = ForceLimit {
+            force: at_least(site, "limit", limit, 0.0)?,
+            speed: f64::INFINITY,
+        };
+        Ok(Box::new(LimitedAt::of_site(site, own)?))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::{Acting, Site};
 use asid_core::simulator::StepView;
 use asid_core::{Result, Target};
 use asid_mjcf::Plant;
-use asid_mjcf::plant::{Drive, DriveLaw};
+use asid_mjcf::plant::{Drive, DriveLaw, ForceLimit};
 
 use super::target;
 
@@ -114,6 +114,59 @@ impl DriveAt {
         let taken = drive.gear * drive.gear * kv;
         view.force[self.dof] -= taken * v;
         view.parameters[damping] -= taken;
+    }
+}
+
+/// A drive whose force on the joint, gear included, stays within limits.
+///
+/// Where several effects limit one drive, one of them applies all limits, so that the damping is
+/// compensated once ([`DriveAt::hold`]).
+pub struct LimitedAt {
+    drive: DriveAt,
+    damping: usize,
+    limits: Vec<ForceLimit>,
+}
+
+impl LimitedAt {
+    /// The drive of a site that is an actuator, within its `own` limit and those that other effects
+    /// have handed over.
+    ///
+    /// The damping of its joint is the first target of the effect, and its gains follow.
+    pub fn of_site(site: &Site<'_>, own: ForceLimit) -> Result<Self> {
+        let drive = DriveAt::of_site(site, 1)?;
+        let others = site.plant.force_limits.iter();
+        let others = others.filter(|(of, _)| *of == drive.actuator);
+        Ok(Self {
+            limits: others.map(|(_, limit)| *limit).chain([own]).collect(),
+            damping: site.columns[0],
+            drive,
+        })
+    }
+}
+
+impl Acting for LimitedAt {
+    fn set(&self, columns: &mut [f64]) {
+        self.drive.set(columns);
+    }
+
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let v = view.qvel[self.drive.dof];
+        let least = self
+            .limits
+            .iter()
+            .min_by(|a, b| a.at(v).total_cmp(&b.at(v)));
+        let Some(limit) = least else { return };
+        let (most, asked) = (limit.at(v), self.drive.force(view));
+        if asked.abs() <= most {
+            return;
+        }
+        self.drive.hold(view, most.copysign(asked), self.damping);
+        if asked * v > 0.0 && most > 0.0 {
+            // Zero for a limit that does not fall with speed.
+            let fall = limit.force / limit.speed;
+            view.force[self.drive.dof] += fall * v;
+            view.parameters[self.damping] += fall;
+        }
     }
 }
 

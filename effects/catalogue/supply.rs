@@ -7,7 +7,7 @@ use asid_mjcf::Plant;
 use asid_mjcf::plant::ForceLimit;
 
 use super::command::{UNLIMITED, limit_targets};
-use super::drive::DriveAt;
+use super::drive::LimitedAt;
 use super::{actuators, at_least, drives, values};
 
 crate::register!(EffectEntry {
@@ -35,37 +35,9 @@ const FAST: f64 = 1000.0;
 ///
 /// The limit is `force` at rest and zero at `speed`, where a motor's own voltage has reached its
 /// supply's (A. Hughes, B. Drury, "Electric Motors and Drives", ch. 3). As for a saturation, the
-/// force that the drive asks for at the start of a step decides ([`DriveAt::hold`]). Where the
-/// drive accelerates the joint, the fall with speed acts as damping, which engines integrate
-/// implicitly.
+/// force that the drive asks for at the start of a step decides ([`LimitedAt`]). Where the drive
+/// accelerates the joint, the fall with speed acts as damping, which engines integrate implicitly.
 struct SpeedLimit;
-
-struct SpeedLimitAt {
-    drive: DriveAt,
-    damping: usize,
-    limit: ForceLimit,
-}
-
-impl Acting for SpeedLimitAt {
-    fn set(&self, columns: &mut [f64]) {
-        self.drive.set(columns);
-    }
-
-    fn before_step(&mut self, view: &mut StepView<'_>) {
-        let v = view.qvel[self.drive.dof];
-        let most = self.limit.at(v);
-        let asked = self.drive.force(view);
-        if asked.abs() <= most {
-            return;
-        }
-        self.drive.hold(view, most.copysign(asked), self.damping);
-        if asked * v > 0.0 && most > 0.0 {
-            let fall = self.limit.force / self.limit.speed;
-            view.force[self.drive.dof] += fall * v;
-            view.parameters[self.damping] += fall;
-        }
-    }
-}
 
 impl Effect for SpeedLimit {
     fn mistaken_for(&self) -> &'static [Confusion] {
@@ -111,14 +83,11 @@ impl Effect for SpeedLimit {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [force, speed] = values(site)?;
-        Ok(Box::new(SpeedLimitAt {
-            drive: DriveAt::of_site(site, 1)?,
-            damping: site.columns[0],
-            limit: ForceLimit {
-                force: at_least(site, "force", force, 0.0)?,
-                speed: at_least(site, "speed", speed, 1e-9)?,
-            },
-        }))
+        let own = ForceLimit {
+            force: at_least(site, "force", force, 0.0)?,
+            speed: at_least(site, "speed", speed, 1e-9)?,
+        };
+        Ok(Box::new(LimitedAt::of_site(site, own)?))
     }
 }
 

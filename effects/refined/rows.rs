@@ -58,7 +58,7 @@ impl Effects {
         }
         let limits: Vec<Option<(usize, ForceLimit)>> = others
             .iter()
-            .map(|&k| self.handed_over(k, &given[k], &acts))
+            .map(|&k| self.handed_over(k, given, &acts))
             .collect();
         let machine = self.machine(columns, limits.iter().copied().flatten().collect());
         let plant = machine.as_ref().unwrap_or(document);
@@ -109,14 +109,25 @@ impl Effects {
         })
     }
 
-    /// The limit of an actuator's force that an effect leaves to another one, which takes the drive.
-    fn handed_over(&self, k: usize, values: &[f64], acts: &[bool]) -> Option<(usize, ForceLimit)> {
+    /// The limit of an actuator's force that an effect leaves to another one: to one that takes the
+    /// drive, or else to the last one that limits it.
+    fn handed_over(
+        &self,
+        k: usize,
+        given: &[Vec<f64>],
+        acts: &[bool],
+    ) -> Option<(usize, ForceLimit)> {
         let placed = &self.placed[k];
-        let limit = placed.effect.force_limit(values)?;
+        let limit = placed.effect.force_limit(&given[k])?;
         let (actuator, drive) = self.plant.drive(&placed.site).ok()?;
         let joint = &self.plant.layout.joints[drive.joint].name;
-        let mut active = self.placed.iter().zip(acts).filter(|(_, acts)| **acts);
-        let taken = active.any(|(other, _)| other.effect.takes_drive() && other.site == *joint);
+        let takes = |other: usize| {
+            let by = &self.placed[other];
+            let limits = || by.effect.force_limit(&given[other]).is_some();
+            let takes_drive = by.effect.takes_drive() && by.site == *joint;
+            takes_drive || other > k && by.site == placed.site && limits()
+        };
+        let taken = (0..self.placed.len()).any(|other| acts[other] && takes(other));
         taken.then_some((actuator, limit))
     }
 

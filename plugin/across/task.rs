@@ -61,6 +61,15 @@ where
 
     fn locate(&self, signals: &[f64]) -> Vec<f64> {
         let start = self.run(|task| task.locate(signals));
+        let own = self.run(|task| task.spec().exploration.start.len());
+        self.border.check(if start.len() == own {
+            Ok(())
+        } else {
+            Err(format!(
+                "the task's reading of the start has {} values where its start has {own}",
+                start.len()
+            ))
+        });
         self.border
             .check_finite(signals, &start, "the task's reading of the start");
         start

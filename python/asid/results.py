@@ -713,7 +713,7 @@ class Diagnosis(Result):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Best(Record):
-    """Whether a row is the best of its column, with an interval apart from the next one's."""
+    """Whether a row is the best of its column, with an interval apart from the others'."""
 
     iqm: bool
     """In the interquartile mean of the metric."""

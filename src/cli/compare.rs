@@ -13,6 +13,7 @@ use asid_core::Error;
 
 use super::figure;
 use super::options::{Common, Simulator, threads};
+use super::settings;
 
 pub mod arm;
 mod cell;
@@ -20,6 +21,7 @@ mod folder;
 mod given;
 mod merge;
 mod methods;
+mod of_run;
 pub mod page;
 mod progress;
 mod request;
@@ -44,7 +46,8 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     condition: Vec<String>,
     /// Play in this kind of real world, such as matched, crossed or perturbed (repeatable)
-    /// [default: matched]
+    /// [default: matched; with --model, --real-model, --real-effect or another --real-backend the
+    /// world is called custom]
     #[arg(long, value_name = "KIND")]
     world: Vec<String>,
     /// Simulate with this engine: see `asid list` (repeatable)
@@ -168,26 +171,34 @@ struct Parts {
 
 impl Arguments {
     /// The request of a figure.
-    fn figure_request(&self) -> figure::Request<'_> {
-        figure::Request {
-            common: Common {
-                backend: self.backend.first().cloned(),
-                seed: self.seed,
-                threads: self.threads,
-                config: self.config.clone(),
-                set: self.set.clone(),
-                out: self.out.clone(),
-                quiet: self.quiet,
-                json: self.json,
-                ..Common::default()
-            },
+    ///
+    /// # Errors
+    /// When the settings cannot be read.
+    fn figure_request(&self) -> Result<figure::Request<'_>> {
+        let mut common = Common {
+            backend: self.backend.first().cloned(),
+            seed: self.seed,
+            threads: self.threads,
+            config: self.config.clone(),
+            set: self.set.clone(),
+            out: self.out.clone(),
+            quiet: self.quiet,
+            json: self.json,
+            ..Common::default()
+        };
+        if common.seed.is_none() {
+            // Each episode has a seed of its own; they count up from that of the settings.
+            common.seed = settings::seed(&settings::given(&common)?)?;
+        }
+        Ok(figure::Request {
+            common,
             tasks: self.tasks.clone(),
             episodes: self.episodes,
             explorers: self.explorer.clone(),
             levels: self.levels.clone(),
             quick: self.quick,
             compare: Box::new(|task, setting, folder| self.compare_at(task, setting, folder)),
-        }
+        })
     }
 
     /// The comparison on a task that these arguments request, under one more setting and in a
@@ -218,7 +229,7 @@ impl Arguments {
 pub fn compare(arguments: &Arguments) -> Result<()> {
     if let Some(name) = &arguments.figure {
         arguments.check_figure(name)?;
-        return figure::figure(name, &arguments.figure_request());
+        return figure::figure(name, &arguments.figure_request()?);
     }
     let parts = &arguments.parts;
     for (option, part) in [

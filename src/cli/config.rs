@@ -128,7 +128,7 @@ fn of_task(task: Box<dyn Task>, arguments: &Arguments, common: &Common) -> Resul
     let (config, _) = Config::resolve(Stage::Run, &*task, common, algorithms, worlds)?;
     let mut page = format!(
         "# Settings of `asid run {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
-         # its name, such as --set explorer.name=value; this text in a file is read by --config FILE.\n",
+         # its name, such as --set explorer.name=random; this text in a file is read by --config FILE.\n",
         task.name()
     );
     let table = toml::Table::try_from(&config)?;

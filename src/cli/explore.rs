@@ -37,7 +37,7 @@ that the simulator expects), policy.json, result.json, config.toml, report.html 
 real.csv is its log, for `asid identify` and `asid diagnose`.
 
 For any machine (a study, or --model FILE with --unknown) it designs the motion with the most information about the unknowns \
-within the limits; explorers are fisher-cem, random, multisine and fourier. docs/any-machine.md has the whole way.")]
+within the limits; explorers are fisher-cem, random, multisine and fourier. docs/any-machine.md has all steps.")]
 pub struct Arguments {
     /// The task (see `asid list`), or a study: a folder or a TOML file
     #[arg(required_unless_present = "model")]
@@ -217,19 +217,25 @@ fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
         None => (given, None),
     };
     let Some(path) = path else {
-        if arguments.motion.any() {
+        if let Some(option) = arguments.motion.first() {
             let message =
                 "goes with a study or --model: a task has unknowns, limits and lengths of its own";
-            return Err(wrong("--unknown", message).into());
+            return Err(wrong(option, message).into());
         }
         return Ok(arguments.task.as_deref());
     };
-    if arguments.policy.is_some() || arguments.train.is_some() || common.preset.is_some() {
-        return Err(wrong("--policy", "goes with a task, as --train and --preset do").into());
+    let of_task = [
+        ("--policy", arguments.policy.is_some()),
+        ("--train", arguments.train.is_some()),
+        ("--preset", common.preset.is_some()),
+    ];
+    if let Some((option, _)) = of_task.iter().find(|(_, is_given)| *is_given) {
+        let message = "goes with a task: a study or model has no policies and no presets";
+        return Err(wrong(option, message).into());
     }
-    if arguments.worlds.real.is_described() {
+    if let Some(option) = arguments.worlds.real.first() {
         let message = "goes with a task: the motion of a study or model is played by you";
-        return Err(wrong("--world", message).into());
+        return Err(wrong(option, message).into());
     }
     let mut common = common.clone();
     if let Some(explorer) = &arguments.explorer {

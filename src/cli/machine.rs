@@ -14,7 +14,7 @@ use std::path::Path;
 use anyhow::Result;
 use asid_core::registry::{TaskEntry, find};
 
-pub use subject::{Subject, is_study};
+pub use subject::{Subject, is_study, no_study};
 
 /// The path that an argument names; `None` for a registered task.
 ///

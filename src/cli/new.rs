@@ -56,6 +56,11 @@ const ENGINE_GUIDE: (&str, &str) = ("GUIDE.md", include_str!("../../docs/add-a-b
 /// The versions of dependencies that this program was built with; a plugin in Rust needs the same.
 const CARGO_LOCK: (&str, &str) = ("Cargo.lock", include_str!("../../Cargo.lock"));
 
+/// The end of a plugin's manifest. Cargo takes a package below a workspace for a part of it, and
+/// refuses it where the workspace does not name it; a checkout of ASID is a workspace.
+const OWN_WORKSPACE: &str =
+    "\n# A workspace of its own, so that it builds in any folder.\n[workspace]\n";
+
 /// Folder of the sources that this program was built from, at build time.
 const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -226,8 +231,20 @@ impl Kind {
         if !self.cargo {
             return text;
         }
-        text.replace(&from.replace('-', "_"), &name.replace('-', "_"))
-            .replace("\"../../", &format!("\"{sources}/"))
+        let (from_in_code, in_code) = (from.replace('-', "_"), name.replace('-', "_"));
+        let text = if from_in_code == from {
+            // A name of one word is the same in code, where it is replaced already. The file of a
+            // library has the name in code.
+            text.replace(&format!("lib{name}."), &format!("lib{in_code}."))
+        } else {
+            text.replace(&from_in_code, &in_code)
+        };
+        let text = text.replace("\"../../", &format!("\"{sources}/"));
+        if file == "Cargo.toml" {
+            text + OWN_WORKSPACE
+        } else {
+            text
+        }
     }
 }
 

@@ -140,6 +140,12 @@ impl Real {
     /// Whether any option describes a real world.
     #[must_use]
     pub fn is_described(&self) -> bool {
+        self.first().is_some()
+    }
+
+    /// Name of the first option that describes a real world; `None` where none does.
+    #[must_use]
+    pub fn first(&self) -> Option<&'static str> {
         let Self {
             world,
             truth,
@@ -147,11 +153,15 @@ impl Real {
             real_model,
             real_effect,
         } = self;
-        world.is_some()
-            || !truth.is_empty()
-            || real_backend.is_some()
-            || real_model.is_some()
-            || !real_effect.is_empty()
+        let given = [
+            ("--world", world.is_some()),
+            ("--truth", !truth.is_empty()),
+            ("--real-backend", real_backend.is_some()),
+            ("--real-model", real_model.is_some()),
+            ("--real-effect", !real_effect.is_empty()),
+        ];
+        let first = given.iter().find(|(_, is_given)| *is_given);
+        first.map(|(name, _)| *name)
     }
 }
 

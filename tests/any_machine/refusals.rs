@@ -41,13 +41,29 @@ fn what_is_wrong_is_told_in_one_line() {
             "--world: goes with a task",
         ),
         (
+            vec!["explore", "cart", "--truth", "mass=1"],
+            "--truth: goes with a task",
+        ),
+        (
+            vec!["explore", "cart", "--preset", "published"],
+            "--preset: goes with a task",
+        ),
+        (
+            vec!["explore", "cart", "--seconds=-5"],
+            "seconds: -5 is out of its domain: a number above 0",
+        ),
+        (
+            vec!["explore", "cart", "--set", "settle=-1"],
+            "settle: -1 is out of its domain: a number from 0 up",
+        ),
+        (
             vec!["explore", "cart", "--seconds", "1", "--period", "0.6"],
             "period: 0.6 s is longer than half of the motion",
         ),
         (vec!["explore", "model.xml"], "nothing is sought"),
         (
             vec!["explore", "rod-balancing", "--seconds", "3"],
-            "goes with a study or --model",
+            "--seconds: goes with a study or --model",
         ),
         (
             vec!["explore", "cart", "--unknown", "mass:1"],

@@ -223,14 +223,17 @@ impl Simulator for NarrowSimulator {
     }
 
     fn save(&mut self, sims: &[usize]) -> Result<Snapshot> {
+        require(self.bits, Capabilities::EXACT_SNAPSHOT)?;
         self.inner.save(sims)
     }
 
     fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
+        require(self.bits, Capabilities::EXACT_SNAPSHOT)?;
         self.inner.load(snapshot, rows, sims)
     }
 
     fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
+        require(self.bits, Capabilities::EXACT_SNAPSHOT)?;
         self.inner.copy_state(from, to)
     }
 

@@ -5,6 +5,7 @@ use asid::core::parameter::Scale;
 use asid::core::{Parameter, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
+use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::step_map::Derivatives;
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
@@ -41,16 +42,17 @@ fn logs(machine: &Machine) -> Logs {
 }
 
 /// The log as a segment, or row by row.
-fn taken(logs: &Logs, segment: Option<usize>) -> Taken {
+fn taken(machine: &Machine, logs: &Logs, segment: Option<usize>) -> Taken {
+    let walks = vec![Walk {
+        segment,
+        ..Walk::new(logs, 0, STEP)
+    }];
     Taken {
         touching: Vec::new(),
-        walks: vec![Walk {
-            segment,
-            ..Walk::new(logs, 0, STEP)
-        }],
         given: vec![None],
         open: Vec::new(),
-        otherwise: vec![vec![0.0; 2 * ROWS]],
+        states: from_readings(&machine.plant, logs, &walks, &[vec![0.0; 2 * ROWS]]),
+        walks,
         scale: vec![0.1, 0.5],
     }
 }
@@ -62,7 +64,8 @@ fn taken(logs: &Logs, segment: Option<usize>) -> Taken {
 fn a_segment_begins_where_a_scaled_sensor_reads_as_logged() {
     let machine = slide();
     let logs = logs(&machine);
-    let (context, estimate) = begin(&machine, &logs, taken(&logs, Some(0)), (&[], &[])).unwrap();
+    let (context, estimate) =
+        begin(&machine, &logs, taken(&machine, &logs, Some(0)), (&[], &[])).unwrap();
     let spec: EffectSpec = "sensor-scale@x:scale=1".parse().unwrap();
     let parameter = Parameter {
         name: "scale".into(),
@@ -89,7 +92,7 @@ fn a_segment_begins_where_a_scaled_sensor_reads_as_logged() {
 fn a_part_of_several_smoothings_is_part_of_the_whole_way() {
     let machine = slide();
     let logs = logs(&machine);
-    let (context, from) = begin(&machine, &logs, taken(&logs, None), (&[], &[])).unwrap();
+    let (context, from) = begin(&machine, &logs, taken(&machine, &logs, None), (&[], &[])).unwrap();
     let mut map = context.map(&[], &[], 3).unwrap();
     let want = Derivatives {
         state: true,

@@ -4,6 +4,7 @@ use asid::core::episode::ChannelColumns;
 use asid::core::{Episode, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
+use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::step_map::{Derivatives, LinearEpisode, StepMap};
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
@@ -67,7 +68,12 @@ fn one_push_of_each_island_tells_what_one_push_at_a_time_does() {
         walks: walk(),
         given: vec![None],
         open: Vec::new(),
-        otherwise: vec![states.clone()],
+        states: from_readings(
+            &machine.plant,
+            &logs,
+            &walk(),
+            std::slice::from_ref(&states),
+        ),
         scale: vec![1.0; 2 * nv],
         touching: Vec::new(),
     };

@@ -6,6 +6,7 @@ use asid::core::parameter::Scale;
 use asid::core::{Episode, Parameter, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
+use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::one_step::one_step_tells;
 use asid::diagnosis::latent_force::step_map::{
     Anew, Derivatives, LinearEpisode, StepMap, Variation,
@@ -204,12 +205,13 @@ fn what_acts_on_readings_alone_is_read_and_not_stepped() {
 /// Whether one physics step gives the derivatives of a row, for a machine with some effects.
 fn tells(machine: &Machine, specs: &[EffectSpec]) -> bool {
     let logs = logs(machine);
+    let walks = vec![Walk::new(&logs, 0, DT)];
     let taken = Taken {
         touching: Vec::new(),
-        walks: vec![Walk::new(&logs, 0, DT)],
+        states: from_readings(&machine.plant, &logs, &walks, &[vec![0.0; 2 * ROWS]]),
+        walks,
         given: vec![None],
         open: Vec::new(),
-        otherwise: vec![vec![0.0; 2 * ROWS]],
         scale: vec![0.1, 0.5],
     };
     let (context, _) = begin(machine, &logs, taken, (&[], &[])).unwrap();

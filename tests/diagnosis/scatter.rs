@@ -5,6 +5,7 @@ use asid::core::{Episode, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
 use asid::diagnosis::latent_force::fit::{Hypothesis, Slopes};
+use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::scatter::Scatter;
 use asid::diagnosis::latent_force::step_map::StepMap;
 use asid::diagnosis::latent_force::walk::Walk;
@@ -79,12 +80,13 @@ fn segment(logs: &Logs) -> Vec<Walk> {
 fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
     let machine = slide(joint);
     let logs = logs(&machine);
+    let walks = segment(&logs);
     let taken = Taken {
         touching: Vec::new(),
-        walks: segment(&logs),
+        states: from_readings(&machine.plant, &logs, &walks, &[vec![0.0; 2 * ROWS]]),
+        walks,
         given: vec![None],
         open: Vec::new(),
-        otherwise: vec![vec![0.0; 2 * ROWS]],
         scale: vec![0.2, 0.5],
     };
     let (context, estimate) = begin(&machine, &logs, taken, (&[], &[])).unwrap();

@@ -8,6 +8,7 @@ use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
 use asid::diagnosis::latent_force::fit::Hypothesis;
 use asid::diagnosis::latent_force::half_step::step_error;
+use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::step_error::DEVIATION;
 use asid::diagnosis::latent_force::step_map::{Derivatives, StepMap};
 use asid::diagnosis::latent_force::walk::Walk;
@@ -80,7 +81,7 @@ fn it_is_what_separates_a_row_of_steps_from_the_solution() {
         walks: walks.clone(),
         given: vec![None],
         open: vec![0, 1],
-        otherwise: vec![vec![0.0; 2 * rows]],
+        states: from_readings(&machine.plant, &logs, &walks, &[vec![0.0; 2 * rows]]),
         scale: vec![0.1, 0.3],
     };
     let (context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();

@@ -37,7 +37,7 @@ fn columns(
     let found = Columns::of(
         context,
         model,
-        estimate,
+        (estimate, estimate),
         (candidates, &|_| Vec::new()),
         &Silent,
     )
@@ -80,8 +80,8 @@ fn compare(segments: [Option<usize>; 2]) {
         touching: Vec::new(),
         given: vec![None; walks.len()],
         open: bench.open.clone(),
-        otherwise,
         scale: scales(plant, &first),
+        states: first,
         walks,
     };
     let parameters = (&study.parameters[..], &nominal[..]);

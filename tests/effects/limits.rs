@@ -156,3 +156,32 @@ fn gears_and_limits_of_the_simulation_are_those_of_the_effects() {
         }
     }
 }
+
+/// Symptom: a servo with two limits of its force ran ahead of the lower one.
+///
+/// Cause: each of the two compensated the servo's damping.
+#[test]
+fn of_two_limits_of_a_servo_the_lower_one_holds() {
+    // A small `kp`, since rapier's servos fall short by `kp v dt`. At 20 N m s/rad a second
+    // compensation raises the speed by 8 %.
+    let servo = machine(
+        "",
+        r#"<position name="drive" joint="spin" kp="1" kv="20"/>"#,
+    );
+    let of_speed = "torque-speed-limit@drive:force=1.5,speed=900";
+    for limits in [
+        [of_speed, "actuator-saturation@drive:limit=2"],
+        ["actuator-saturation@drive:limit=2", of_speed],
+        [
+            "actuator-saturation@drive:limit=1.5",
+            "torque-speed-limit@drive:force=2,speed=900",
+        ],
+    ] {
+        for backend in engines_that_load(of_speed, &servo) {
+            let rows = Bench::new(&*backend, &servo, &limits).hold(50, &[1e4]);
+            let expected = 1.5 * 50.0 * DT / (INERTIA + ARMATURE);
+            let what = limits.join(" and ");
+            near(&what, rows[49][1], expected, 0.03 * expected);
+        }
+    }
+}

@@ -15,7 +15,7 @@ pub(super) const DAMPINGS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 const ARRIVED: f64 = 0.01;
 
 /// Smallest half step of the differences, in units of the entries: below it rounding dominates
-/// where simulations hold six digits.
+/// where simulations hold six digits. A smaller one of the settings is kept as it is.
 const LEAST_STEP: f64 = 1e-3;
 
 /// The state of one start's descent.
@@ -28,7 +28,8 @@ pub(super) struct Walker {
     pub(super) done: bool,
 }
 
-/// Evaluates points spread over the box (its middle and random draws); returns the best as starts.
+/// Evaluates points spread over the box (zero, its middle and random draws); returns the best as
+/// starts.
 pub(super) fn screen(
     settings: &GaussNewtonSettings,
     residuals: &mut Residuals<'_>,
@@ -38,6 +39,12 @@ pub(super) fn screen(
     use rand::Rng as _;
     let n = space.low.len();
     let mut points = vec![vec![0.0; n]];
+    // A box about an earlier result has that in its middle.
+    let ends = space.low.iter().zip(space.high);
+    let middle: Vec<f64> = ends.map(|(low, high)| 0.5 * (low + high)).collect();
+    if settings.screened > 1 && middle.iter().any(|x| *x != 0.0) {
+        points.push(middle);
+    }
     while points.len() < settings.screened {
         // Entries that are estimated jointly are drawn within one standard deviation of zero.
         let point = (0..n).map(|i| {
@@ -151,7 +158,8 @@ pub(super) fn iterate(
         let prior = DMatrix::identity(n, n);
         let covariance = inverse_above_prior(&(&told.information + prior));
         for j in 0..n {
-            walker.steps[j] = covariance[(j, j)].sqrt().clamp(LEAST_STEP, settings.step);
+            let least = LEAST_STEP.min(settings.step);
+            walker.steps[j] = covariance[(j, j)].sqrt().clamp(least, settings.step);
         }
     }
     seen.extend(trials);

@@ -234,3 +234,66 @@ fn luck_is_in_the_residual_and_is_no_misfit() {
     let misfit = mean(|f| f.misfit);
     assert!((misfit - 1.0).abs() < 0.15, "{misfit}");
 }
+
+/// Symptom: `--set identifier.gauss_newton.step=0.0005` made the program panic. Cause: the smallest
+/// step of the differences was above the largest.
+#[test]
+fn a_first_step_below_the_smallest_one_is_kept() {
+    let (low, high) = ([-1.7; 2], [1.7; 2]);
+    let settings = GaussNewtonSettings {
+        step: 5e-4,
+        ..GaussNewtonSettings::default()
+    };
+    let fit = found(&settings, space(&low, &high, 2), 4, |x| {
+        (0..READINGS)
+            .map(|k| 10.0 * (x[k % 2] - [0.4, -0.3][k % 2]))
+            .collect()
+    });
+    assert!((fit.point[0] - 0.4).abs() < 1e-3, "{:?}", fit.point);
+    assert!((fit.point[1] + 0.3).abs() < 1e-3, "{:?}", fit.point);
+}
+
+/// Symptom: a result told nothing of its search where a late fit failed. Cause: the course was left
+/// out on that way.
+#[test]
+fn a_late_failure_leaves_the_course_of_the_search() {
+    let settings = GaussNewtonSettings::default();
+    let (low, high) = ([-1.7], [1.7]);
+    let region = 1 + 2 * sets(1);
+    let mut fits = 0;
+    let mut residuals = |points: &[Vec<f64>]| {
+        fits += usize::from(points.len() == region);
+        let row = |p: &Vec<f64>| (fits < 2).then(|| vec![10.0 * (p[0] - 0.4); READINGS]);
+        Ok(points.iter().map(row).collect::<Vec<_>>())
+    };
+    let mut rng = Streams::new(5).stream("search");
+    let space = space(&low, &high, 1);
+    let fit = minimise(&settings, &mut residuals, space, &mut rng, || {})
+        .unwrap()
+        .unwrap();
+    assert!((fit.point[0] - 0.4).abs() < 1e-3, "{:?}", fit.point);
+    // Every iteration, the fit that succeeded and the one that failed.
+    assert_eq!(fit.course.len(), settings.iterations + 2);
+}
+
+/// Symptom: a later round of a fit, in a box about the earlier result, began anywhere but there.
+/// Cause: the middle of every box was taken to be zero.
+#[test]
+fn the_middle_of_a_box_is_among_the_first_points() {
+    let (low, high) = ([0.5, -1.7], [1.7, -0.3]);
+    let mut first: Option<Vec<Vec<f64>>> = None;
+    let mut residuals = |points: &[Vec<f64>]| {
+        if first.is_none() {
+            first = Some(points.to_vec());
+        }
+        let row = |p: &Vec<f64>| Some(vec![p[0] - p[1]; READINGS]);
+        Ok(points.iter().map(row).collect::<Vec<_>>())
+    };
+    let mut rng = Streams::new(6).stream("search");
+    let settings = GaussNewtonSettings::default();
+    let space = space(&low, &high, 2);
+    minimise(&settings, &mut residuals, space, &mut rng, || {}).unwrap();
+    let first = first.unwrap();
+    assert_eq!(first.len(), settings.screened);
+    assert!(first.contains(&vec![1.1, -1.0]), "{first:?}");
+}

@@ -43,13 +43,24 @@ impl BatchHandle {
     /// Makes a batch.
     ///
     /// # Errors
-    /// [`Error::Config`] for no simulations; the engine's own errors.
+    /// [`Error::Config`] for no simulations, [`Error::Parameter`] for a target that is named twice;
+    /// the engine's own errors.
     pub fn new(model: Arc<ModelHandle>, config: &BatchConfig) -> Result<Self> {
         if config.size == 0 {
             return Err(Error::Config {
                 key: "size".into(),
                 message: "a batch needs at least one simulation".into(),
             });
+        }
+        let mut rest = &config.targets[..];
+        while let Some((target, others)) = rest.split_first() {
+            if others.contains(target) {
+                return Err(Error::Parameter {
+                    parameter: target.to_string(),
+                    message: "is named twice".into(),
+                });
+            }
+            rest = others;
         }
         let engine = &model.engine;
         let columns: Vec<String> = config.targets.iter().map(ToString::to_string).collect();

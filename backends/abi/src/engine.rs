@@ -155,7 +155,9 @@ impl Engine {
                 name,
                 version: text(table.version, "the engine's version")?,
                 about: text(table.about, "the engine's description")?,
-                capabilities: Capabilities::from_bits_truncate(table.capabilities),
+                // Bits of a later minor version mean nothing here.
+                capabilities: Capabilities::from_bits_truncate(table.capabilities)
+                    & table::capabilities(),
                 actions: OFTEN.map(|name| (name, Action::new(path, name))).into(),
                 path: path.to_path_buf(),
                 table,

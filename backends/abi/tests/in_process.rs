@@ -277,6 +277,20 @@ fn targets_that_the_engine_does_not_name_are_named_by_the_host() {
     );
 }
 
+/// Symptom: of two columns for one target an engine kept the last, and the other was lost silently.
+#[test]
+fn a_target_that_is_named_twice_stops_at_the_adapter() {
+    let model = engine::<Sound>().backend("e").load(&scene()).unwrap();
+    let twice = ["option/gravity/2", "body/a/mass", "option/gravity/2"];
+    let config = BatchConfig {
+        size: 1,
+        threads: 1,
+        targets: twice.iter().map(|t| t.parse().unwrap()).collect(),
+    };
+    let error = model.simulator(&config).err().unwrap().to_string();
+    assert_eq!(error, "parameter `option/gravity/2`: is named twice");
+}
+
 #[test]
 fn a_snapshot_outlives_batch_and_model() {
     let backend = engine::<Sound>().backend("e");
@@ -498,6 +512,17 @@ fn handles_that_were_destroyed_are_not_found() {
             abi::SHAPE
         );
     }
+}
+
+/// Symptom: a bit of a later version would have been taken for one that the host has for itself.
+#[test]
+fn a_later_table_claims_what_this_version_knows() {
+    let mut later = *keep(table::<Sound>("an engine"));
+    later.abi_minor = 7;
+    later.capabilities |= Capabilities::LIVE_PARAMETERS.bits() | 1 << 40;
+    // SAFETY: a complete table.
+    let engine = unsafe { Engine::from_table(keep(later), Path::new("lib.so")) }.unwrap();
+    assert_eq!(engine.capabilities(), FreeFlight.capabilities());
 }
 
 #[test]

@@ -153,9 +153,11 @@ impl Simulator for Batch {
         check_state(&self.compiled.layout, sims.len(), qpos, qvel)?;
         let rows = vec![(); sims.len()];
         self.for_each(sims, rows, |compiled, row, world, ()| {
-            let time = world.state.time;
+            let (time, status) = (world.state.time, world.state.status.clone());
             let qpos = &qpos[row * nq..(row + 1) * nq];
             world.place(compiled, qpos, &qvel[row * nv..(row + 1) * nv], time);
+            // One that has diverged stands still until it is reset, loaded or copied into.
+            world.state.status = status;
         });
         Ok(())
     }

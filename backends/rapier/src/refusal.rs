@@ -5,7 +5,10 @@
 //! engine's solver (`solref`, `solimp`, `impratio`, integrators) are not physics of the scene and
 //! pass. The exception is a contact whose damping is so low that it makes bodies bounce.
 
+mod attribute;
+
 use std::collections::HashSet;
+use std::path::Path;
 
 use asid_core::{Error, Result, Scene};
 use asid_mjcf::document::is_of_higher_order;
@@ -33,30 +36,6 @@ const ELEMENTS: [&str; 13] = [
     "replicate",
 ];
 
-/// Attributes that change the physics and that this backend or its loader lacks.
-const ATTRIBUTES: [(&str, &str); 20] = [
-    ("position", "dampratio"),
-    ("position", "timeconst"),
-    ("position", "inheritrange"),
-    ("position", "delay"),
-    ("velocity", "delay"),
-    ("motor", "delay"),
-    ("general", "delay"),
-    ("general", "dyntype"),
-    ("motor", "dyntype"),
-    ("joint", "actuatorfrcrange"),
-    ("joint", "actuatorgravcomp"),
-    ("joint", "springdamper"),
-    ("freejoint", "align"),
-    ("geom", "fluidshape"),
-    ("geom", "gap"),
-    ("geom", "shellinertia"),
-    ("compiler", "settotalmass"),
-    ("compiler", "balanceinertia"),
-    ("compiler", "inertiagrouprange"),
-    ("compiler", "alignfree"),
-];
-
 fn refuse(scene: &Scene, message: String) -> Error {
     Error::Scene {
         scene: scene.name().to_owned(),
@@ -70,6 +49,7 @@ fn refuse(scene: &Scene, message: String) -> Error {
 /// [`Error::Scene`], naming the first such part and its line.
 pub fn check(scene: &Scene, model: &Model) -> Result<()> {
     check_document(scene)?;
+    check_attached(scene)?;
     check_bodies(scene, model)?;
     check_actuators(scene, model)?;
     for equality in &model.equality {
@@ -102,6 +82,26 @@ fn named_kind(node: &Node<'_, '_>) -> Option<&'static str> {
     }
 }
 
+/// Checks the documents that a document attaches, and those that they attach.
+fn check_attached(scene: &Scene) -> Result<()> {
+    if !scene.xml().contains("<attach") {
+        return Ok(());
+    }
+    let document = roxmltree::Document::parse(scene.xml())
+        .map_err(|e| refuse(scene, format!("cannot read it: {e}")))?;
+    let folder = scene.directory().unwrap_or(Path::new(""));
+    let assets = document.descendants().filter(|n| n.has_tag_name("asset"));
+    let models = assets
+        .flat_map(|n| n.children())
+        .filter(|n| n.has_tag_name("model"));
+    for file in models.filter_map(|n| n.attribute("file")) {
+        let attached = Scene::from_file(&folder.join(file))?;
+        check_document(&attached)?;
+        check_attached(&attached)?;
+    }
+    Ok(())
+}
+
 fn check_document(scene: &Scene) -> Result<()> {
     let document = roxmltree::Document::parse(scene.xml())
         .map_err(|e| refuse(scene, format!("cannot read it: {e}")))?;
@@ -132,16 +132,9 @@ fn check_document(scene: &Scene) -> Result<()> {
         if ELEMENTS.contains(&tag) && !in_defaults && (!ambiguous || in_actuators) {
             return Err(refuse(scene, format!("cannot simulate {}", place(&node))));
         }
-        for (element, attribute) in ATTRIBUTES {
-            if tag == element
-                && let Some(value) = node.attribute(attribute)
-                && !["0", "false", "none", "auto", "-1"].contains(&value)
-            {
-                return Err(refuse(
-                    scene,
-                    format!("cannot honour `{attribute}` of {}", place(&node)),
-                ));
-            }
+        if let Some(attribute) = attribute::refused(&node) {
+            let what = format!("cannot honour `{attribute}` of {}", place(&node));
+            return Err(refuse(scene, what));
         }
         if let Some(attribute) = of_higher_order(&node) {
             return Err(refuse(
@@ -265,7 +258,17 @@ fn check_bodies(scene: &Scene, model: &Model) -> Result<()> {
                 || joint.armature != 0.0
                 || joint.frictionloss != 0.0
                 || joint.stiffness != 0.0;
+            // Zeros of a joint overrule what its class says.
+            let timed = joint
+                .springdamper
+                .is_some_and(|s| s.iter().any(|x| *x != 0.0));
             match joint.type_ {
+                _ if timed => {
+                    return Err(refuse(
+                        scene,
+                        format!("cannot honour `springdamper` of joint `{joint_name}`"),
+                    ));
+                }
                 JointType::Free if body.joints.len() > 1 => {
                     return Err(refuse(
                         scene,

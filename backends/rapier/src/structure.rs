@@ -53,7 +53,7 @@ pub struct BodyValues {
 /// How the mass of each body is determined.
 #[derive(Clone, Debug)]
 pub struct MassModel {
-    /// Per body: the `<inertial>` element, where it counts.
+    /// Per body: the `<inertial>` element, where it counts, or none at all where geoms do not.
     inertials: Vec<Option<Inertia>>,
     /// Per body: indices of its geoms.
     geoms_of: Vec<std::ops::Range<usize>>,
@@ -198,8 +198,18 @@ fn direction(axis: [f64; 3]) -> Vector3<f64> {
 }
 
 /// The `<inertial>` of a body, if the compiler's settings use it.
+///
+/// A body that states none has no mass where geoms have none (`inertiafromgeom="false"`).
 fn inertial(body: &Body, compiler: &Compiler) -> Option<Inertia> {
-    let given = body.inertial.as_ref()?;
+    let Some(given) = body.inertial.as_ref() else {
+        let massless = Inertia {
+            mass: 0.0,
+            center: Vector3::zeros(),
+            moments: Vector3::zeros(),
+            axes: UnitQuaternion::identity(),
+        };
+        return (compiler.inertia_from_geom == InertiaFromGeom::False).then_some(massless);
+    };
     if compiler.inertia_from_geom == InertiaFromGeom::True && !body.geoms.is_empty() {
         return None;
     }

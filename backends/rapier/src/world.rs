@@ -7,7 +7,7 @@ mod forces;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use asid_core::layout::Channel;
-use asid_core::simulator::StepHook;
+use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Recording, Status};
 use nalgebra::Vector3;
 use rapier3d::dynamics::RigidBodyHandle;
@@ -106,23 +106,31 @@ impl World {
         }
     }
 
-    /// Takes one physics step; a failure is recorded in the status.
+    /// Takes one physics step; a failure of the engine is recorded in the status.
+    ///
+    /// # Panics
+    /// When the hook panics.
     pub fn step(&mut self, compiled: &Compiled, input: &StepInput<'_>) {
         if !self.state.status.is_running() {
             return;
         }
+        self.ctrl.copy_from_slice(input.ctrl);
+        if let Some(hook) = input.hook {
+            self.ask(compiled, input, hook);
+        }
         let outcome = catch_unwind(AssertUnwindSafe(|| self.try_step(compiled, input)));
+        if input.hook.is_some() {
+            // Back to the parameters as set, also after a failure.
+            self.swap_live(compiled, input.slots);
+        }
         self.state.fresh = false;
         self.steps += 1;
+        let excess = self.excess.take().map(|body| {
+            let name = &compiled.layout.bodies[body];
+            format!("a force on body `{name}` is beyond {MAX_FORCE} N")
+        });
         let message = match outcome {
-            Ok(()) => self
-                .excess
-                .take()
-                .map(|body| {
-                    let name = &compiled.layout.bodies[body];
-                    format!("a force on body `{name}` is beyond {MAX_FORCE} N")
-                })
-                .or_else(|| self.complaint(compiled)),
+            Ok(()) => excess.or_else(|| self.complaint(compiled)),
             Err(panic) => Some(
                 panic
                     .downcast_ref::<String>()
@@ -141,36 +149,36 @@ impl World {
         }
     }
 
+    /// Shows the state to a hook, and applies the parameters that it wants for this step.
+    fn ask(&mut self, compiled: &Compiled, input: &StepInput<'_>, hook: &dyn StepHook) {
+        self.state
+            .coordinates(compiled, &mut self.qpos, &mut self.qvel);
+        self.force.fill(0.0);
+        self.live.clear();
+        self.live.extend(input.slots.iter().map(|slot| {
+            if slot.is_live() {
+                slot.get(&self.tables, compiled)
+            } else {
+                0.0
+            }
+        }));
+        let mut view = StepView {
+            time: self.state.time,
+            qpos: &self.qpos,
+            qvel: &self.qvel,
+            ctrl: &mut self.ctrl,
+            force: &mut self.force,
+            parameters: &mut self.live,
+        };
+        hook.before_step(input.row, input.step, &mut view);
+        self.swap_live(compiled, input.slots);
+    }
+
     fn try_step(&mut self, compiled: &Compiled, input: &StepInput<'_>) {
-        self.ctrl.copy_from_slice(input.ctrl);
-        let mut hooked: &[f64] = &[];
-        if let Some(hook) = input.hook {
-            self.state
-                .coordinates(compiled, &mut self.qpos, &mut self.qvel);
-            self.force.fill(0.0);
-            self.live.clear();
-            self.live.extend(input.slots.iter().map(|slot| {
-                if slot.is_live() {
-                    slot.get(&self.tables, compiled)
-                } else {
-                    0.0
-                }
-            }));
-            hook.before_step(
-                input.row,
-                input.step,
-                &mut asid_core::simulator::StepView {
-                    time: self.state.time,
-                    qpos: &self.qpos,
-                    qvel: &self.qvel,
-                    ctrl: &mut self.ctrl,
-                    force: &mut self.force,
-                    parameters: &mut self.live,
-                },
-            );
-            self.swap_live(compiled, input.slots);
-            hooked = &self.force;
-        }
+        let hooked: &[f64] = match input.hook {
+            Some(_) => &self.force,
+            None => &[],
+        };
         self.state.refresh_link_velocities(compiled);
         self.state.drive(compiled, &self.tables, &self.ctrl, hooked);
         if input.hook.is_some() {
@@ -231,9 +239,6 @@ impl World {
         }
         for (&body, &before) in compiled.floating.iter().zip(&self.rotations) {
             self.state.correct_root(compiled, body, before);
-        }
-        if input.hook.is_some() {
-            self.swap_live(compiled, input.slots);
         }
     }
 

@@ -205,6 +205,114 @@ fn what_it_cannot_simulate_is_refused_by_name() {
     assert!(Rapier.load(&scene(inside)).is_ok());
 }
 
+/// Symptom: a drive with a damper or a rotor of its own, and one that was switched off, moved as if
+/// the document did not say so. Cause: the parser knows none of these attributes.
+#[test]
+fn what_a_document_says_of_drives_is_not_passed_over() {
+    let inside = |before: &str, joint: &str, motor: &str| {
+        format!(
+            r#"{before}<worldbody><body><joint name="j" {joint}/><geom size=".1"/></body></worldbody>
+            <actuator><motor name="m" joint="j" {motor}/></actuator>"#
+        )
+    };
+    let class = |says: &str| format!("<default>{says}</default>");
+    let groups = r#"<option actuatorgroupdisable="0"/>"#;
+    let masses = r#"<compiler inertiagrouprange="0 0"/>"#;
+    let timed = class(r#"<joint springdamper="0.5 0.3"/>"#);
+    for (scene_of, says) in [
+        (
+            inside("", "", r#"damping="0.2""#),
+            "`damping` of <motor> `m`",
+        ),
+        (
+            inside("", "", r#"armature="0.2""#),
+            "`armature` of <motor> `m`",
+        ),
+        (
+            inside(&class(r#"<motor damping="1 2"/>"#), "", ""),
+            "`damping` of <motor> on",
+        ),
+        (inside(groups, "", ""), "`actuatorgroupdisable` of <option>"),
+        (inside(masses, "", ""), "`inertiagrouprange` of <compiler>"),
+        (inside(&timed, "", ""), "`springdamper` of joint `j`"),
+        (
+            inside("", r#"springdamper="0.5 0.3""#, ""),
+            "`springdamper` of joint `j`",
+        ),
+    ] {
+        let Err(error) = Rapier.load(&scene(&scene_of)) else {
+            panic!("`{says}` was let in");
+        };
+        let text = error.to_string();
+        assert!(text.contains(says) && !text.contains('\n'), "{text}");
+    }
+}
+
+/// Symptom: a link swung too slowly. Cause: a geom had mass although the document says that masses
+/// are those of `<inertial>` alone.
+#[test]
+fn geoms_have_no_mass_where_the_document_says_so() {
+    let inside = r#"<compiler inertiafromgeom="false"/><worldbody><body><joint name="j" axis="0 1 0"/>
+      <inertial pos=".3 0 0" mass="1" diaginertia=".01 .01 .01"/>
+      <body pos="0 0 .4"><geom size=".1" mass="2"/></body></body></worldbody>"#;
+    let rate = Bench::new(inside, &["qvel.j"]).run(1, &[])[0][0];
+    let theory = 9.81 * 0.3 / (0.01 + 0.3 * 0.3) * 0.002;
+    assert!(
+        (rate / theory - 1.0).abs() < 1e-3,
+        "{rate} against {theory}"
+    );
+}
+
+/// Symptom: an exported model was refused for its `springdamper="0 0"`. Cause: of the values that
+/// mean the same as none, a few were known by their spelling.
+#[test]
+fn values_that_mean_none_are_let_in() {
+    let turning = |before: &str, joint: &str, more: &str| {
+        let inside = format!(
+            r#"{before}<option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1" {joint}/>
+            <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/><geom size=".1" {more}/></body></worldbody>
+            <actuator><motor joint="j" damping="0 0" armature="0.0" delay="0.0"/></actuator>"#
+        );
+        let mut bench = Bench::new(&inside, &["qvel.j"]);
+        bench.place(&[0.0], &[2.0]);
+        bench.run(500, &[0.0])[499][0]
+    };
+    // The coefficient itself counts: the rate decays with damping over inertia.
+    let decayed = 2.0 * (-1.0f64).exp();
+    let timed = r#"<default><joint springdamper="0.5 0.3"/></default>"#;
+    let none =
+        r#"<compiler settotalmass="-1" inertiagrouprange="0 5"/><option actuatorgroupdisable=""/>"#;
+    for rate in [
+        turning(timed, r#"damping="0.1" springdamper="0 0""#, ""),
+        turning(
+            none,
+            r#"damping="0.1" actuatorfrcrange="0 0""#,
+            r#"gap="0.0""#,
+        ),
+    ] {
+        assert!((rate - decayed).abs() < 0.003, "{rate} against {decayed}");
+    }
+}
+
+/// Symptom: a servo of an attached document moved without its damping. Cause: parts that the loader
+/// skips were sought in the document alone that attaches it.
+#[test]
+fn what_an_attached_document_says_is_not_passed_over() {
+    let folder = std::env::temp_dir().join(format!("asid-rapier-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let tool = r#"<mujoco><worldbody><body name="tool"><joint name="turn"/><geom size="0.1"/></body></worldbody>
+      <actuator><position name="servo" joint="turn" kp="5" dampratio="1"/></actuator></mujoco>"#;
+    std::fs::write(folder.join("tool.xml"), tool).unwrap();
+    let inside = r#"<asset><model name="tool" file="tool.xml"/></asset><worldbody><body><joint/>
+      <geom size="0.1"/><attach model="tool" body="tool" prefix="a_"/></body></worldbody>"#;
+    let attaching = scene(inside).in_directory(Some(folder.clone()));
+    let refused = Rapier.load(&attaching).map(|_| ());
+    std::fs::remove_dir_all(&folder).unwrap();
+    let text = refused.unwrap_err().to_string();
+    assert!(text.contains("tool.xml: backend"), "{text}");
+    assert!(text.contains("`dampratio` of <position> `servo`"), "{text}");
+}
+
 #[test]
 fn an_empty_scene_runs() {
     let scene = Scene::from_xml("empty", "<mujoco/>", &[]).unwrap();

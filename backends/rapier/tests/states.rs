@@ -5,6 +5,8 @@
 
 mod support;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use asid_core::simulator::{ExternalForce, StepHook, StepView};
 use asid_core::{Control, Rollout, Status};
 use support::{Bench, scene};
@@ -230,6 +232,53 @@ fn a_simulation_that_diverges_stops_alone() {
     bench.simulator.reset(&[1]).unwrap();
     assert!(bench.simulator.status()[1].is_running());
     assert_eq!(bench.run(50, &PUSH)[50..100].concat(), rows[0]);
+}
+
+/// Symptom: a simulation that had diverged went on where its state was set, which it does on no
+/// other engine. Cause: every state that is set began as a running one.
+#[test]
+fn a_diverged_simulation_that_is_placed_stands_still() {
+    let inside =
+        r#"<worldbody><body name="b"><freejoint name="b"/><geom size=".1"/></body></worldbody>"#;
+    let mut bench = Bench::new(inside, &["qpos.b"]);
+    let place = |z: f64| [0.0, 0.0, z, 1.0, 0.0, 0.0, 0.0];
+    // Farther than a simulation may be.
+    bench.place(&place(1e5), &[0.0; 6]);
+    assert!(bench.run(1, &[])[0][0].is_nan());
+    bench.place(&place(1.0), &[0.0; 6]);
+    assert!(!bench.simulator.status()[0].is_running());
+    assert!(bench.read()[0].is_nan() && bench.run(1, &[])[0][0].is_nan());
+    bench.simulator.reset(&[0]).unwrap();
+    bench.place(&place(1.0), &[0.0; 6]);
+    assert!((bench.run(1, &[])[0][2] - 1.0).abs() < 1e-3);
+}
+
+/// A hook that fails in its third step.
+struct Fails;
+
+impl StepHook for Fails {
+    fn before_step(&self, _row: usize, step: usize, _view: &mut StepView<'_>) {
+        assert!(step < 2, "no force");
+    }
+}
+
+/// Symptom: an effect of a plugin that failed looked like a simulation that diverged. Cause: a panic
+/// of the hook was taken for one of the engine.
+#[test]
+fn a_hook_that_panics_is_no_divergence() {
+    let mut bench = busy(1, 1, &[]);
+    let record = bench.simulator.layout().recording(&CHANNELS).unwrap();
+    let mut out = vec![0.0; 5 * record.width()];
+    let ctrl = PUSH.repeat(5);
+    let mut rollout = Rollout::new(&[0], 5, 1, Control::Shared(&ctrl), &record);
+    rollout.hook = Some(&Fails);
+    let rolled = catch_unwind(AssertUnwindSafe(|| {
+        bench.simulator.rollout(&rollout, &mut out)
+    }));
+    let said = rolled.unwrap_err();
+    assert_eq!(said.downcast_ref::<&str>(), Some(&"no force"));
+    assert!(bench.simulator.status()[0].is_running());
+    assert!(bench.run(1, &PUSH)[0].iter().all(|x| x.is_finite()));
 }
 
 struct Push;

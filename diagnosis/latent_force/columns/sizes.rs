@@ -103,11 +103,14 @@ fn parts<'c>(
 /// Returns priors' standard deviations from the effect of a trial step of each parameter, one per
 /// `(candidate, start, parameter)`.
 ///
+/// The step acts along the trajectory of the first estimate, and makes up for the missing force of
+/// the second.
+///
 /// Zero where the step has no effect, and where work was stopped before it was measured. The flag
 /// says whether all were measured.
 pub(super) fn sizes(
     context: &Context<'_>,
-    estimate: &Estimate,
+    (estimate, lacking): (&Estimate, &Estimate),
     source: &Source<'_>,
     trials: &[(usize, Vec<f64>, usize)],
 ) -> Result<(Vec<f64>, bool)> {
@@ -142,7 +145,7 @@ pub(super) fn sizes(
     };
     let (columns, complete) = source.columns(&short, &states, &wanted)?;
     // A joint that neither moves nor lacks a force shows no size.
-    let missing: Vec<f64> = estimate
+    let missing: Vec<f64> = lacking
         .force_quantile(context, QUANTILE)
         .iter()
         .zip(&context.inertial)
@@ -240,14 +243,17 @@ pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
 
 /// Returns priors' standard deviations where some walks are segments: the smaller of those from
 /// replays and from rows of the other walks.
+///
+/// Trajectory, noise and missing changes of speed are those of the first estimate, and the residuals
+/// of replays to make up for those of the second.
 pub(super) fn sizes_along(
-    (context, estimate): (&Context<'_>, &Estimate),
+    (context, estimates): (&Context<'_>, (&Estimate, &Estimate)),
     linear: &[LinearEpisode],
     taken: (&[Along], &[usize]),
     m: usize,
 ) -> Vec<f64> {
-    let by_rows = sizes_along_rows((context, estimate), linear, taken, m);
-    let by_replay = sizes_by_replay(context, estimate, taken, m).into_iter();
+    let by_rows = sizes_along_rows((context, estimates.0), linear, taken, m);
+    let by_replay = sizes_by_replay(context, estimates, taken, m).into_iter();
     by_replay.zip(by_rows).map(|(a, b)| a.min(b)).collect()
 }
 
@@ -258,7 +264,7 @@ pub(super) fn sizes_along(
 /// initial states take up most of a change.
 fn sizes_by_replay(
     context: &Context<'_>,
-    estimate: &Estimate,
+    (estimate, lacking): (&Estimate, &Estimate),
     (columns, which): (&[Along], &[usize]),
     m: usize,
 ) -> Vec<f64> {
@@ -277,7 +283,7 @@ fn sizes_by_replay(
             }
         }
     }
-    let left = 1.0 + estimate.missing(context).readings;
+    let left = 1.0 + lacking.missing(context).readings;
     let size = |s: f64| REPLAY_MULTIPLE * (left * n / s).sqrt();
     squares.into_iter().map(size).collect()
 }

@@ -40,11 +40,28 @@ impl Missing {
 }
 
 impl Estimate {
-    /// Returns the power of the missing force at a degree of freedom, beyond the resolution, in
-    /// units of the inertial forces there.
+    /// Returns the power of the missing force at a degree of freedom, in units of the inertial
+    /// forces there; 0 if no reading tells of the force.
+    ///
+    /// Such a force is as large as the fit began with, times every common scale of the variances
+    /// since. The spin of a ball in flight of which only the place is read is an example.
+    #[must_use]
+    pub fn missing_power(&self, context: &Context<'_>, dof: usize) -> f64 {
+        self.power_beyond(context, (dof, 0.0))
+    }
+
+    /// Returns the same power beyond the resolution.
     fn missing_at(&self, context: &Context<'_>, dof: usize) -> f64 {
-        let noise = &self.noise;
-        let beyond = noise.q[dof] + noise.white[dof] - self.least_white[dof];
+        self.power_beyond(context, (dof, self.least_white[dof]))
+    }
+
+    /// Returns the power of the missing force at a degree of freedom beyond a variance `least`, in
+    /// units of the inertial forces there; 0 if no reading tells of the force.
+    fn power_beyond(&self, context: &Context<'_>, (dof, least): (usize, f64)) -> f64 {
+        if !self.told[dof] {
+            return 0.0;
+        }
+        let beyond = self.noise.q[dof] + self.noise.white[dof] - least;
         beyond.max(0.0) / context.inertial[dof].powi(2)
     }
 

@@ -24,14 +24,26 @@ const SPEEDS: usize = 10;
 const ROWS: usize = 9;
 const DT: f64 = 0.02;
 
-fn plant() -> Plant {
-    Plant::of(&Scene::from_xml("scene", SCENE, &[]).unwrap()).unwrap()
+/// A pendulum on a ball joint, and a free body whose speeds are read before its orientation.
+const TURNING: &str = r#"<mujoco><option timestep="0.01"/><worldbody>
+    <body><joint name="pivot" type="ball"/><geom size="0.1" pos="0 0 -0.3" mass="1"/></body>
+    <body name="free"><freejoint name="free"/><geom size="0.1" mass="1"/></body></worldbody>
+    <sensor><ballquat name="pivot" joint="pivot"/><ballangvel name="rate" joint="pivot"/>
+    <frameangvel name="spin" objtype="xbody" objname="free"/>
+    <framelinvel name="speed" objtype="xbody" objname="free"/>
+    <framequat name="turn" objtype="xbody" objname="free"/>
+    <framepos name="at" objtype="xbody" objname="free"/></sensor></mujoco>"#;
+
+fn plant_of(scene: &str) -> Plant {
+    Plant::of(&Scene::from_xml("scene", scene, &[]).unwrap()).unwrap()
 }
 
-/// Returns the first states of a log of some sensors, from a function of sensor and row;
-/// coordinates that no sensor reads are 7.
-fn states(sensors: &[&str], reading: impl Fn(&str, usize) -> Vec<f64>) -> Vec<Vec<f64>> {
-    let plant = plant();
+fn plant() -> Plant {
+    plant_of(SCENE)
+}
+
+/// Returns a log of some sensors, from a function of sensor and row.
+fn logs(plant: &Plant, sensors: &[&str], reading: impl Fn(&str, usize) -> Vec<f64>) -> Logs {
     let names: Vec<String> = sensors.iter().map(|s| (*s).to_owned()).collect();
     let channels = names.iter().map(|name| ChannelColumns {
         name: name.clone(),
@@ -44,11 +56,22 @@ fn states(sensors: &[&str], reading: impl Fn(&str, usize) -> Vec<f64>) -> Vec<Ve
         readings: rows.flat_map(|(s, k)| reading(s, k)).collect(),
         ..Episode::default()
     };
-    let logs = Logs::new(&plant, &names, vec![("log".into(), episode)]).unwrap();
-    let walk = Walk::new(&logs, 0, plant.layout.timestep);
-    let otherwise = vec![vec![7.0; ROWS * WIDTH]];
-    let found = from_readings(&plant, &logs, &[walk], &otherwise);
-    found[0].chunks_exact(WIDTH).map(<[f64]>::to_vec).collect()
+    Logs::new(plant, &names, vec![("log".into(), episode)]).unwrap()
+}
+
+/// Returns the first states of such a log; coordinates that no sensor reads are 7.
+fn states_of(plant: &Plant, logs: &Logs) -> Vec<Vec<f64>> {
+    let width = plant.layout.nq + plant.layout.nv;
+    let walk = Walk::new(logs, 0, plant.layout.timestep);
+    let otherwise = vec![vec![7.0; ROWS * width]];
+    let found = from_readings(plant, logs, &[walk], &otherwise);
+    found[0].chunks_exact(width).map(<[f64]>::to_vec).collect()
+}
+
+/// The same for the first scene.
+fn states(sensors: &[&str], reading: impl Fn(&str, usize) -> Vec<f64>) -> Vec<Vec<f64>> {
+    let plant = plant();
+    states_of(&plant, &logs(&plant, sensors, reading))
 }
 
 /// Orientation of a body that begins on its side and turns at a steady speed about its own axes.
@@ -131,6 +154,71 @@ fn the_spin_of_a_body_is_about_its_own_axes_whatever_the_signs_of_its_quaternion
         assert!(turn < 1e-7, "row {k}: {turn}");
         assert_near(&state[SPEEDS + 6..], spin.as_slice(), 1e-9);
     }
+}
+
+/// Symptom: a pendulum on a ball joint, whose encoder reads 60 degrees, was smoothed from where the
+/// document places it.
+///
+/// Cause: its sensor counted as reading no joint. So it seemed never to move, and its initial state
+/// could not either.
+#[test]
+fn a_ball_joint_is_where_its_sensors_read_it() {
+    let plant = plant_of(TURNING);
+    let own = Vector3::new(0.3, -0.8, 2.0);
+    let reading = |sensor: &str, k: usize| match sensor {
+        "pivot" => wxyz(
+            turning(own, k),
+            if k.is_multiple_of(2) { -1.0 } else { 1.0 },
+        ),
+        _ => vec![1.0, 2.0, 3.0],
+    };
+    // Speeds begin behind the quaternion of the pendulum and the position of the free body.
+    let of_pivot = 11..14;
+    let all = logs(&plant, &["pivot"], reading);
+    for (k, state) in states_of(&plant, &all).iter().enumerate() {
+        let turn = unit_quaternion(&state[..4]).angle_to(&turning(own, k));
+        assert!(turn < 1e-7, "row {k}: {turn}");
+        assert_near(&state[of_pivot.clone()], own.as_slice(), 1e-9);
+    }
+    // A measured speed is better than a difference.
+    let measured = logs(&plant, &["pivot", "rate"], reading);
+    for state in states_of(&plant, &measured) {
+        assert_near(&state[of_pivot.clone()], &[1.0, 2.0, 3.0], 1e-12);
+    }
+    let noise = position_noise(&plant, &all);
+    assert!(noise[..3].iter().all(|n| *n > 0.0));
+    assert!(noise[3..].iter().all(|n| *n == 0.0));
+    let entries = position_entries(&plant, &all);
+    assert_eq!(entries[..4], [Some(0), Some(1), Some(2), None]);
+}
+
+/// Symptom: the spin of a free body that a sensor reads was certain to be zero. Cause: speeds were
+/// read of joints alone.
+#[test]
+fn a_free_body_has_the_speeds_that_its_sensors_read() {
+    let plant = plant_of(TURNING);
+    let side = turning(Vector3::zeros(), 0);
+    let spin = Vector3::new(2.0, -5.0, 9.0);
+    let reading = |sensor: &str, k: usize| match sensor {
+        // About the axes of the world.
+        "spin" => (side * spin).as_slice().to_vec(),
+        "speed" => vec![-1.0, 0.5, 4.0],
+        "turn" => wxyz(side, 1.0),
+        _ => vec![DT * k as f64; 3],
+    };
+    let all = logs(&plant, &["spin", "speed", "turn", "at"], reading);
+    for state in states_of(&plant, &all) {
+        assert_near(&state[14..17], &[-1.0, 0.5, 4.0], 1e-12);
+        assert_near(&state[17..20], spin.as_slice(), 1e-9);
+    }
+    // Without an orientation the body stands as the other states say: q = (7, 7, 7, 7) turns the
+    // axes x, y, z into y, z, x.
+    let alone = logs(&plant, &["spin"], |_, _| vec![1.0, 2.0, 3.0]);
+    for state in states_of(&plant, &alone) {
+        assert_near(&state[17..20], &[2.0, 3.0, 1.0], 1e-12);
+    }
+    let scale = scales(&plant, &[states_of(&plant, &all).concat()]);
+    assert_near(&scale[15..18], &[2.0, 5.0, 9.0], 1e-9);
 }
 
 #[test]

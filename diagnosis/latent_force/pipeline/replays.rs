@@ -69,7 +69,8 @@ fn region(fitted: &Fitted) -> Option<Region> {
 
 /// All fitted sets, one for each set of names, in descending order of evidence.
 ///
-/// The set of the `known` candidates, if there are any, is always among them, even if another set
+/// The set that stands is one of them, whether or not it was fitted in a round. The set of the
+/// `known` candidates, if there are any, is always among them, even if another set
 /// has the same names beside tolerances.
 fn all_sets(outcome: &Outcome, candidates: &[Candidate], known: &[usize]) -> Vec<Set> {
     let mut sets: Vec<Set> = Vec::new();
@@ -79,7 +80,9 @@ fn all_sets(outcome: &Outcome, candidates: &[Candidate], known: &[usize]) -> Vec
         (!known.is_empty() && set.candidates == known, members)
     };
     let stands = |set: &Set| set.candidates == outcome.best.candidates;
-    for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
+    let best = Some(&outcome.best).filter(|set| !set.candidates.is_empty());
+    let confirmed = outcome.rounds.iter().flat_map(|r| &r.confirmed);
+    for set in confirmed.chain(best) {
         let members = named(set);
         match sets.iter_mut().find(|s| named(s) == members) {
             // A set with tolerances and the same set without them are the same answer.
@@ -451,5 +454,23 @@ mod tests {
         assert!(stands && replayed.len() == 2);
         // A search that knows no steps gives one answer for one set of names.
         assert_eq!(all_sets(&outcome, &candidates, &[]).len(), 1);
+    }
+
+    /// Symptom: a search ended with a name, and the verdict was `unknown`. Cause: the set that
+    /// stands was looked for among the fits of the rounds. This one had been fitted between two
+    /// rounds, without a name of a trial base that it does not need.
+    #[test]
+    fn the_set_that_stands_is_replayed_wherever_it_was_fitted() {
+        let candidates = ["actuator-delay@m", "sensor-drift@q"].map(candidate);
+        let fitted = |names: &[&[usize]], evidence| set(&candidates, (names, &[]), evidence);
+        let rounds = vec![
+            round(&[], &[], (&[], vec![fitted(&[&[0]], 60.0)])),
+            round(&[0], &[], (&[], vec![fitted(&[&[0], &[1]], 190.0)])),
+        ];
+        let outcome = outcome(rounds, fitted(&[&[1]], 180.0));
+        let sets = all_sets(&outcome, &candidates, &[]);
+        let (replayed, stands) = replayed_sets(&outcome, sets, (&[], 4));
+        assert!(stands && replayed[0].candidates == [1]);
+        assert_eq!(replayed.len(), 3);
     }
 }

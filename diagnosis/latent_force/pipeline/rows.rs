@@ -1,6 +1,7 @@
 //! Selects the rows of the logs, and decides which are smoothed and which are cut into segments.
 
-use asid_core::Result;
+use asid_core::layout::JointKind;
+use asid_core::{Layout, Result};
 use asid_mjcf::Plant;
 
 use crate::bench::Bench;
@@ -86,8 +87,8 @@ pub(super) struct Rows {
     pairs: Vec<[usize; 2]>,
     /// Largest magnitude of each tangent coordinate.
     scale: Vec<f64>,
-    /// States of the coordinates that no sensor reads.
-    unread: Unread,
+    /// States by the readings, `rows x (nq + nv)`, one array for each log.
+    states: Vec<Vec<f64>>,
 }
 
 impl Rows {
@@ -108,7 +109,7 @@ impl Rows {
             pairs: pairs_touching(&shown),
             scale: scales(plant, &first),
             walks,
-            unread,
+            states: first,
         })
     }
 
@@ -138,22 +139,33 @@ impl Rows {
             let known = w.rows[0] == 0 && episode.initial.is_some();
             known.then(|| given_start(plant, episode))
         };
+        let width = bench.layout().nq + bench.layout().nv;
         Taken {
             given: walks.iter().map(given).collect(),
             open: bench.open.clone(),
-            otherwise: self.unread.along(&walks),
+            states: walks.iter().map(|w| self.states_along(w, width)).collect(),
             scale: self.scale.clone(),
             touching: self.pairs.clone(),
             walks,
         }
     }
+
+    /// The states by the readings along a part of a log, each of so many numbers.
+    ///
+    /// An object that the part never reads is where readings before and after it show it. A speed
+    /// at the first row follows from rows on both sides.
+    fn states_along(&self, part: &Walk, width: usize) -> Vec<f64> {
+        let rows = &self.walks[part.episode].rows;
+        let first = rows.partition_point(|row| *row < part.rows[0]);
+        self.states[part.episode][first * width..(first + part.len()) * width].to_vec()
+    }
 }
 
 /// States along the logs of the coordinates that no sensor reads.
 enum Unread {
-    /// The first keyframe, at rest: every hinge and slide is read.
+    /// The first keyframe, at rest: every hinge, slide and ball joint is read.
     Home(Vec<f64>),
-    /// The first keyframe, with hinges and slides as in replays of the model as given.
+    /// The first keyframe, with hinges, slides and ball joints as in replays of the model as given.
     /// `rows x (nq + nv)` for each log.
     ///
     /// At rest, a joint that no sensor reads would seem never to move, and no smoother would let it
@@ -170,24 +182,14 @@ impl Unread {
         let logs = &bench.train.logs;
         let plant = &bench.machine.plant;
         let noise = position_noise(plant, logs);
-        let joints: Vec<_> = plant.scalar_joints().map(|j| &layout.joints[j]).collect();
-        if joints.iter().all(|j| noise[j.qvel] > 0.0) {
+        let mut joints = layout.joints.iter().filter(|j| j.kind != JointKind::Free);
+        if joints.all(|j| noise[j.qvel] > 0.0) {
             return Self::Home(still);
         }
         let states = |path: &Path| -> Vec<f64> {
             let rows = path.qpos.chunks_exact(nq).zip(path.qvel.chunks_exact(nv));
-            let state = |(q, v): (&[f64], &[f64])| {
-                let mut state = still.clone();
-                for joint in &joints {
-                    let own = [q[joint.qpos], v[joint.qvel]];
-                    // A replay that diverged carries no information.
-                    if own.iter().all(|x| x.is_finite()) {
-                        (state[joint.qpos], state[nq + joint.qvel]) = (own[0], own[1]);
-                    }
-                }
-                state
-            };
-            rows.flat_map(state).collect()
+            rows.flat_map(|row| with_joints(layout, &still, row))
+                .collect()
         };
         Self::Replayed {
             states: replayed.episodes.iter().map(states).collect(),
@@ -210,6 +212,25 @@ impl Unread {
     }
 }
 
+/// Returns a state with the joints at other positions and speeds, `qpos` and `qvel`; free bodies
+/// stay.
+///
+/// A joint whose replay diverged stays too, since that carries no information.
+fn with_joints(layout: &Layout, still: &[f64], (qpos, qvel): (&[f64], &[f64])) -> Vec<f64> {
+    let mut state = still.to_vec();
+    let joints = layout.joints.iter().filter(|j| j.kind != JointKind::Free);
+    for joint in joints {
+        let places = joint.qpos..joint.qpos + joint.kind.qpos_len();
+        let speeds = joint.qvel..joint.qvel + joint.kind.qvel_len();
+        let own = [&qpos[places.clone()], &qvel[speeds.clone()]];
+        if own.iter().copied().flatten().all(|x| x.is_finite()) {
+            state[places].copy_from_slice(own[0]);
+            state[layout.nq + speeds.start..layout.nq + speeds.end].copy_from_slice(own[1]);
+        }
+    }
+    state
+}
+
 /// The first rows of each walk, as many as the budget of physics steps allows: a screening
 /// simulates them once for each column.
 fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
@@ -224,4 +245,84 @@ fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
         w.part(0..rows.max(FEWEST).min(w.len()))
     };
     walks.iter().map(part).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::episode::ChannelColumns;
+    use asid_core::{Episode, Scene};
+
+    use crate::data::Logs;
+
+    use super::*;
+
+    /// Symptom: in segments in which its camera did not see a puck, the puck was replayed from
+    /// where the document places it. Cause: each segment was taken from its own readings alone.
+    #[test]
+    fn what_a_segment_does_not_read_is_where_the_log_shows_it() {
+        let scene = r#"<mujoco><worldbody><body>
+            <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
+            <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap()).unwrap();
+        // At 1 m/s, read in the first and in the last tenth of a second.
+        let place = |k: u32| match k {
+            10..40 => f64::NAN,
+            _ => 0.3 + 0.01 * f64::from(k),
+        };
+        let episode = Episode {
+            time: (0..50).map(|k| 0.01 * f64::from(k)).collect(),
+            channels: vec![ChannelColumns {
+                name: "place".into(),
+                len: 1,
+            }],
+            readings: (0..50).map(place).collect(),
+            ..Episode::default()
+        };
+        let named = vec![("log".into(), episode)];
+        let logs = Logs::new(&plant, &["place".to_owned()], named).unwrap();
+        let walks = vec![Walk::new(&logs, 0, plant.layout.timestep)];
+        let home = vec![0.0; 2 * 50];
+        let rows = Rows {
+            touches: vec![vec![true; 50]],
+            pairs: Vec::new(),
+            scale: Vec::new(),
+            states: from_readings(&plant, &logs, &walks, &[home]),
+            walks,
+        };
+        let found = rows.states_along(&rows.walks[0].part(15..35), 2);
+        assert_eq!(found.len(), 2 * 20);
+        for (k, state) in found.chunks_exact(2).enumerate() {
+            let want = [0.45 + 0.01 * k as f64, 1.0];
+            for (got, want) in state.iter().zip(want) {
+                assert!((got - want).abs() < 1e-9, "row {k}: {state:?}");
+            }
+        }
+    }
+
+    /// Symptom: a pendulum on a ball joint of which only the tip is read was smoothed from where
+    /// the document places it, at rest. Cause: only hinges and slides were taken from replays.
+    #[test]
+    fn joints_that_no_sensor_reads_move_as_in_replays() {
+        let scene = r#"<mujoco><worldbody>
+            <body><joint name="ball" type="ball"/><geom size="0.1" mass="1"/></body>
+            <body><joint name="hinge" type="hinge"/><geom size="0.1" mass="1"/></body>
+            <body><freejoint name="free"/><geom size="0.1" mass="1"/></body></worldbody></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("scene", scene, &[]).unwrap()).unwrap();
+        let layout = &plant.layout;
+        let still = vec![0.0; layout.nq + layout.nv];
+        let replayed: Vec<f64> = (1..=layout.nq + layout.nv).map(|i| i as f64).collect();
+        let (mut qpos, qvel) = (replayed[..layout.nq].to_vec(), &replayed[layout.nq..]);
+        let ball = 0..4;
+        let of = |qpos: &[f64]| with_joints(layout, &still, (qpos, qvel));
+        let found = of(&qpos);
+        let (places, speeds) = found.split_at(layout.nq);
+        assert_eq!(places[..5], qpos[..5]);
+        assert_eq!(speeds[..4], qvel[..4]);
+        assert!(places[5..].iter().chain(&speeds[4..]).all(|x| *x == 0.0));
+        // The other joint of a replay that diverged still carries information.
+        qpos[2] = f64::NAN;
+        let found = of(&qpos);
+        assert_eq!(found[ball], [0.0; 4]);
+        assert_eq!((found[4], found[layout.nq + 3]), (qpos[4], qvel[3]));
+    }
 }

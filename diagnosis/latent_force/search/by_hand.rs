@@ -80,6 +80,7 @@ pub fn fitted(candidates: &[Candidate], members: &[usize], evidence: f64) -> Fit
             free: Vec::new(),
             scatter: Vec::new(),
             least_white: Vec::new(),
+            told: Vec::new(),
             excess: Vec::new(),
             misled: Vec::new(),
             rolls: 0,

@@ -14,7 +14,7 @@ use crate::latent_force::fit::{Slopes, rise};
 use crate::latent_force::screen::Pairs;
 
 use super::path::Path;
-use super::prior::worth;
+use super::prior::{log_prior, worth};
 use super::round::Upon;
 use super::second_look::members;
 use super::set::{Set, without};
@@ -59,7 +59,7 @@ impl Search<'_> {
                 .flat_map(|r| &r.confirmed)
                 .map(members)
                 .collect();
-            let rivals = self.in_place_of(&path.best, &out, known)?;
+            let rivals = self.in_place_of(&path, &out, known)?;
             for rival in rivals {
                 let is_better = worth(&rival) > worth(&path.best) + rise(self.context);
                 if let Some(last) = path.rounds.last_mut() {
@@ -73,32 +73,40 @@ impl Search<'_> {
         Ok(path)
     }
 
-    /// Sets with other names in place of some candidates of a set, fitted to the end; those `known`
-    /// are left out.
+    /// Sets with other names in place of some candidates of the best set of a path, fitted to the
+    /// end; those `known` are left out.
     ///
     /// To first order they are about as likely as the candidates that they replace.
     fn in_place_of(
         &self,
-        set: &Set,
+        path: &Path,
         out: &[usize],
         mut known: Vec<BTreeSet<usize>>,
     ) -> Result<Vec<Set>> {
-        let rest = out.iter();
+        let (set, rest) = (&path.best, out.iter());
         let mut base = rest.fold(set.clone(), |s, &c| without(&s, self.candidates, c));
         base.fitted.slopes = Slopes::default();
         let open = open_upon(self.candidates, self.known, &base);
-        let upon: Upon<'_> = self.upon(&base, &open);
+        // The estimate of the whole set lacks little of what the candidates are to make up for. A
+        // fit of the base lacks all of it, and so does the model without effects.
+        let mut fits = path.rounds.iter().flat_map(|r| &r.confirmed);
+        let fit_of_base = fits.find(|s| members(s) == members(&base));
+        let upon = Upon {
+            priors: fit_of_base.map_or(self.without, |s| &s.fitted.estimate),
+            ..self.upon(&base, &open)
+        };
         let look = upon.look(Pairs::BeyondTheBetter)?;
         let price = upon.price();
-        let own: BTreeSet<usize> = out.iter().copied().collect();
-        let is_own = |m: &[usize]| m.iter().copied().collect::<BTreeSet<usize>>() == own;
         let ranked = &look.ranked;
         let rows = ranked.iter().map(|s| (upon.named(&look, s), s.gain));
         let what = super::name_of(self.candidates, out);
         self.progress
             .ranking(&format!("in place of {what}"), &rows.collect::<Vec<_>>());
-        let least = ranked.iter().find(|s| is_own(&upon.members(&look, s)));
-        let least = least.map_or(f64::INFINITY, |s| s.worth(price) - self.breadth.near);
+        let places = out.iter().map(|c| open.iter().position(|o| o == c));
+        let places: Option<Vec<usize>> = places.collect();
+        let own = places.and_then(|places| look.evidence_of(&places));
+        let prior = log_prior(self.context.plant(), self.candidates, out);
+        let least = own.map_or(f64::INFINITY, |gain| gain + prior - self.breadth.near);
         let mut sets = Vec::new();
         for s in ranked
             .iter()

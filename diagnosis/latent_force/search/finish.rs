@@ -8,6 +8,7 @@ use asid_core::Result;
 use crate::latent_force::fit::{Extent, Slopes};
 
 use super::open_loop::{MOST, OpenLoopGap};
+use super::prior::log_prior;
 use super::prune::{Counts, earned, pruned, pruned_at_once};
 use super::round::Upon;
 use super::set::{Set, from_fit_of, name_of};
@@ -22,14 +23,16 @@ impl Upon<'_> {
     /// Fits to the end the sets that are not far behind, and prunes each.
     ///
     /// They are compared with the best of them and with the evidence that another set has
-    /// `reached`.
+    /// `reached`. Those that come first in the order of a screening, by prior odds and the price of
+    /// each further name too, have the places.
     pub(super) fn finish(&self, raced: Vec<Set>, reached: f64) -> Result<Fits> {
         let (context, breadth, progress) = (self.context, self.breadth, self.progress);
         let base = self.base.fitted.evidence;
         // A set's own predicted gain counts for it; only reached evidence counts against others.
         let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
         let mut raced = raced;
-        raced.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
+        let order = |s: &Set| hoped(s) + self.odds(s);
+        raced.sort_by(|a, b| order(b).total_cmp(&order(a)));
         // Compared after equally many linearisations: a set that was fitted to the end would lead
         // by these alone.
         let best = raced
@@ -86,6 +89,13 @@ impl Upon<'_> {
             self.level(&mut fits.sets)?;
         }
         Ok(fits)
+    }
+
+    /// Prior odds of a set, in nats, less the price of each name beyond the first that it adds.
+    fn odds(&self, set: &Set) -> f64 {
+        let first = self.base.names.count() + 1;
+        let more = set.names.count().saturating_sub(first) as f64;
+        log_prior(self.context.plant(), self.candidates, &set.candidates) - self.price() * more
     }
 
     /// Whether a set makes up for as much of what the set `before` leaves as a further name must.

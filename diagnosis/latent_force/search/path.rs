@@ -34,6 +34,17 @@ impl Path {
         }
     }
 
+    /// Adds a set to the fits of the last round, if no round has it.
+    ///
+    /// A set that was reduced to the names it needs may have been fitted in none.
+    fn remember(&mut self, set: &Set) {
+        let mut fitted = self.rounds.iter().flat_map(|r| &r.confirmed);
+        let is_known = fitted.any(|s| s.candidates == set.candidates);
+        if let Some(last) = self.rounds.last_mut().filter(|_| !is_known) {
+            last.confirmed.push(set.clone());
+        }
+    }
+
     /// Joins this path with one that began from another set of its first round; the end that is
     /// worth more stands.
     ///
@@ -168,6 +179,7 @@ impl Search<'_> {
                     .for_each(|round| round.confirmed.push(smaller.clone()));
                 path.best = smaller;
             } else {
+                path.remember(&next);
                 path.best = next;
             }
             if stopped {
@@ -194,6 +206,7 @@ impl Search<'_> {
         Upon {
             context: self.context,
             base,
+            priors: &base.fitted.estimate,
             at_first: self.at_first,
             candidates: self.candidates,
             open,
@@ -201,5 +214,31 @@ impl Search<'_> {
             open_loop: self.open_loop,
             progress: self.progress,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::latent_force::search::by_hand;
+
+    #[test]
+    fn a_set_that_no_round_has_fitted_is_one_of_the_last() {
+        let labels = ["coulomb-friction@a", "actuator-delay@m"];
+        let candidates = labels.map(by_hand::candidate);
+        let set = |names: &[&[usize]]| by_hand::set(&candidates, (names, &[]), 9.0);
+        let [dry, both, late] = [set(&[&[0]]), set(&[&[0], &[1]]), set(&[&[1]])];
+        let mut path = Path::from(dry.clone());
+        path.rounds = vec![
+            by_hand::round(&[], &[], (&[], vec![dry.clone()])),
+            by_hand::round(&[0], &[], (&[], vec![both])),
+        ];
+        // The delay makes the friction unnecessary that it was added to.
+        for set in [&late, &dry, &late] {
+            path.remember(set);
+        }
+        let fits: Vec<usize> = path.rounds.iter().map(|r| r.confirmed.len()).collect();
+        assert_eq!(fits, [1, 2]);
+        assert_eq!(path.rounds[1].confirmed[1].candidates, [1]);
     }
 }

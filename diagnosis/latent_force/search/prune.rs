@@ -2,13 +2,13 @@
 
 use asid_core::{Progress, Result};
 use asid_effects::Start;
-use nalgebra::{DMatrix, DVector};
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Missing;
 use crate::settings::Breadth;
 
+use super::savage_dickey::{change_without, conditional, is_size, leaving, without_values};
 use super::set::{IDLE, Set, without};
 
 /// Evidence, in nats, that a set may lose when insignificant members are removed.
@@ -19,6 +19,12 @@ const IDLE_LOSS: f64 = 1.0;
 /// A law that joints share is not much smaller at one of them, unless that member makes up for its
 /// share of what is missing.
 const SLIGHT: f64 = 1.0 / 3.0;
+/// Largest predicted loss, in thresholds, at which a set is refitted without a name: first-order
+/// predictions are right to a factor of about three.
+pub(super) const TANGENT: f64 = 3.0;
+/// Number of members found to be needed at which all others count as needed too: each takes a whole
+/// fit.
+const NEEDED: usize = 2;
 
 /// What a member of a set contributes: its distance from its null, in posterior deviations and in
 /// its own unit.
@@ -42,17 +48,12 @@ fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
         if candidates[c].is_tolerance {
             continue;
         }
-        // The speed at which a law changes is no measure of its size. A delay, which has no
-        // derivative, is one.
         let all_of = candidates[c].parameters();
         let has_slopes = all_of.iter().any(|p| p.start == Start::Slope);
         let sizes = range.clone().filter_map(|i| {
             let p = &candidates[c].parameters()[i - range.start];
             let k = free.iter().position(|&f| f == i)?;
-            let is_slope = p.start == Start::Slope;
-            if !is_slope
-                && (has_slopes || !matches!(p.start, Start::Values(_) | Start::Multiples(..)))
-            {
+            if !is_size(p, has_slopes) {
                 return None;
             }
             let deviation = fitted.covariance[(k, k)].max(0.0).sqrt();
@@ -127,6 +128,10 @@ pub(super) type Counts<'c> = dyn Fn(&Set, &Set) -> Result<bool> + 'c;
 ///
 /// Each name must raise the evidence by the `threshold` and pass `counts`. If the remaining set is
 /// among the `others` that were fitted, that fit is used.
+///
+/// Members are tried in the order of what their removal costs to first order. That order may be
+/// wrong for a limit, whose cost is not known. So a second member is tried after one that is needed,
+/// if its removal may cost little.
 pub(super) fn earned(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -134,15 +139,20 @@ pub(super) fn earned(
     (breadth, threshold, counts): (Breadth, f64, &Counts<'_>),
     progress: &dyn Progress,
 ) -> Result<Set> {
-    let is_more = |c: &usize| !candidates[*c].is_tolerance && !base.candidates.contains(c);
     let mut set = set;
+    let mut needed: Vec<usize> = Vec::new();
     while set.names.count() > base.names.count() + 1 && !progress.is_stopped() {
-        let added = set.candidates.iter().copied().filter(is_more);
+        let is_kept = |c: &usize| base.candidates.contains(c) || needed.contains(c);
+        let is_open = |c: &usize| !candidates[*c].is_tolerance && !is_kept(c);
         let change = |c: usize| change_without(candidates, &set, &[c]).unwrap_or(f64::NEG_INFINITY);
-        // The member whose removal costs least.
-        let Some(out) = added.max_by(|a, b| change(*a).total_cmp(&change(*b))) else {
+        let open = set.candidates.iter().copied().filter(is_open);
+        let changes = open.map(|c| (c, change(c)));
+        let Some((out, change)) = changes.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             break;
         };
+        if !needed.is_empty() && change < -TANGENT * threshold {
+            break;
+        }
         let mut smaller = without(&set, candidates, out);
         let same = |o: &&Set| {
             let is_in = |c: &usize| smaller.candidates.contains(c);
@@ -152,10 +162,14 @@ pub(super) fn earned(
             Some(known) => smaller = known.clone(),
             None => smaller.fit(context, (breadth.rounds[1], progress))?,
         }
-        if set.rises_above(&smaller, threshold) && counts(&smaller, &set)? {
+        if !set.rises_above(&smaller, threshold) || !counts(&smaller, &set)? {
+            set = smaller;
+            continue;
+        }
+        needed.push(out);
+        if needed.len() == NEEDED {
             break;
         }
-        set = smaller;
     }
     Ok(set)
 }
@@ -163,7 +177,7 @@ pub(super) fn earned(
 /// Prunes as [`pruned`] does if there is no time for another fit.
 ///
 /// The remaining values take their means given that the removed ones are at their null values. The
-/// evidence follows from the densities there ([`at_null`]). Slight members stay.
+/// evidence follows from the densities there ([`without_values`]). Slight members stay.
 pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
     let idle: Vec<usize> = (deeds(candidates, &set).iter())
         .filter(|d| d.strength < IDLE)
@@ -174,7 +188,7 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
     }
     let fitted = &set.fitted;
     let free = fitted.hypothesis.free();
-    let out = values_of(candidates, &set, &idle);
+    let out = leaving(candidates, &set, &idle);
     let Some((gain, shift)) = without_values(&set, &out) else {
         return set;
     };
@@ -186,10 +200,10 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
         let [low, high] = fitted.hypothesis.unknowns[i].bounds;
         smaller.fitted.theta[i] = (smaller.fitted.theta[i] + shift[k]).clamp(low, high);
     }
-    let stay: Vec<usize> = (0..free.len()).filter(|k| !out.contains(k)).collect();
+    let stay: Vec<usize> = (0..free.len()).filter(|k| !out.all.contains(k)).collect();
     // The values are at their means now; the old distances would be those of other values.
     smaller.fitted.ahead = vec![0.0; stay.len()];
-    let covariance = conditional(&fitted.covariance, &stay, &out);
+    let covariance = conditional(&fitted.covariance, &stay, &out.off);
     for &c in &idle {
         smaller = without(&smaller, candidates, c);
     }
@@ -199,115 +213,4 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
         own.select_columns(&stay)
     });
     smaller
-}
-
-/// Positions of the values of some candidates of a set among its fitted values.
-fn values_of(candidates: &[Candidate], set: &Set, of: &[usize]) -> Vec<usize> {
-    let free = set.fitted.hypothesis.free();
-    let mut at = set.fitted.theta.len();
-    let mut all = Vec::new();
-    for &c in set.candidates.iter().rev() {
-        let end = at;
-        at -= candidates[c].parameters().len();
-        if of.contains(&c) {
-            all.extend((0..free.len()).filter(|&k| (at..end).contains(&free[k])));
-        }
-    }
-    all
-}
-
-/// As [`at_null`], for fitted values of a set.
-fn without_values(set: &Set, out: &[usize]) -> Option<(f64, DVector<f64>)> {
-    let fitted = &set.fitted;
-    let free = fitted.hypothesis.free();
-    let unknowns = || free.iter().map(|&i| (&fitted.hypothesis.unknowns[i], i));
-    let off = DVector::from_iterator(
-        free.len(),
-        unknowns().map(|(u, i)| fitted.theta[i] - u.center),
-    );
-    let prior = DVector::from_iterator(free.len(), unknowns().map(|(u, _)| u.deviation));
-    at_null(&off, &fitted.covariance, &prior, out)
-}
-
-/// Change of the evidence of a set without some of its candidates, to first order; `None` if it is
-/// not known.
-pub(super) fn change_without(candidates: &[Candidate], set: &Set, out: &[usize]) -> Option<f64> {
-    let values = values_of(candidates, set, out);
-    without_values(set, &values).map(|(gain, _)| gain)
-}
-
-/// Covariance of the values `stay` given those `out`; `None` if the latter are certain.
-fn conditional(covariance: &DMatrix<f64>, stay: &[usize], out: &[usize]) -> Option<DMatrix<f64>> {
-    let block = |a: &[usize], b: &[usize]| covariance.select_rows(a).select_columns(b);
-    let own = block(out, out).cholesky()?;
-    Some(block(stay, stay) - block(stay, out) * own.solve(&block(out, stay)))
-}
-
-/// Effect of fixing some values of a normal posterior at the centers of their priors: the change of
-/// the evidence, and the change of each value.
-///
-/// The change of the evidence is the logarithm of the ratio of posterior to prior density at the
-/// centers (Savage and Dickey 1971). `off` holds the distances of the posterior's means from the
-/// centers, `prior` the standard deviations of the priors, and `out` the positions of the fixed
-/// values. `None` if the posterior has no density.
-fn at_null(
-    off: &DVector<f64>,
-    covariance: &DMatrix<f64>,
-    prior: &DVector<f64>,
-    out: &[usize],
-) -> Option<(f64, DVector<f64>)> {
-    let own = covariance.select_rows(out).select_columns(out).cholesky()?;
-    let away = off.select_rows(out);
-    let weighed = own.solve(&away);
-    let log_prior: f64 = out.iter().map(|&k| prior[k].ln()).sum();
-    let log_determinant: f64 = own.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-    let gain = log_prior - log_determinant - 0.5 * away.dot(&weighed);
-    Some((gain, -(covariance.select_columns(out) * weighed)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Log marginal likelihood of `y = a x + e` less that of `x = 0`, with `e ~ N(0, 1)` and
-    /// `x ~ N(0, s^2)`; the posterior's mean and covariance.
-    fn regression(
-        a: &DMatrix<f64>,
-        y: &DVector<f64>,
-        s: &DVector<f64>,
-    ) -> (f64, DVector<f64>, DMatrix<f64>) {
-        let precision = DMatrix::from_diagonal(&s.map(|s| 1.0 / (s * s)));
-        let posterior = (a.transpose() * a + &precision).cholesky().unwrap();
-        let moment = a.transpose() * y;
-        let mean = posterior.solve(&moment);
-        let determinant: f64 = posterior.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-        let prior: f64 = s.iter().map(|s| s.ln()).sum();
-        let evidence = 0.5 * moment.dot(&mean) - determinant - prior;
-        (evidence, mean, posterior.inverse())
-    }
-
-    #[test]
-    fn taking_a_value_out_is_the_regression_without_its_column() {
-        let a = DMatrix::from_fn(12, 4, |i, j| {
-            ((1.3 * i as f64 + 0.7) * (j + 1) as f64).sin()
-        });
-        let y = DVector::from_fn(12, |i, _| (0.4 * i as f64).cos() + 0.3 * a[(i, 2)]);
-        let s = DVector::from_column_slice(&[0.5, 2.0, 1.0, 3.0]);
-        let (all, mean, covariance) = regression(&a, &y, &s);
-        for out in [vec![1], vec![3, 0]] {
-            let stay: Vec<usize> = (0..4).filter(|k| !out.contains(k)).collect();
-            let some = (a.select_columns(&stay), s.select_rows(&stay));
-            let (fewer, mean_of_fewer, covariance_of_fewer) = regression(&some.0, &y, &some.1);
-            let (gain, shift) = at_null(&mean, &covariance, &s, &out).unwrap();
-            assert!(
-                (gain - (fewer - all)).abs() < 1e-9,
-                "{gain} {}",
-                fewer - all
-            );
-            let moved = (&mean + shift).select_rows(&stay);
-            assert!((moved - mean_of_fewer).norm() < 1e-9);
-            let left = conditional(&covariance, &stay, &out).unwrap();
-            assert!((left - covariance_of_fewer).norm() < 1e-9);
-        }
-    }
 }

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
 use crate::latent_force::context::Context;
-use crate::latent_force::estimate::Missing;
+use crate::latent_force::estimate::{Estimate, Missing};
 use crate::latent_force::fit::Fitted;
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
@@ -55,6 +55,9 @@ pub(super) struct Upon<'r> {
     pub(super) context: &'r Context<'r>,
     /// The set that stands.
     pub(super) base: &'r Set,
+    /// The estimate whose missing force gives the widths of the candidates' priors: that of a model
+    /// without what the candidates are to make up for.
+    pub(super) priors: &'r Estimate,
     /// What is missing without effects.
     pub(super) at_first: Missing,
     /// All candidates, and the indices of those that are open.
@@ -129,14 +132,19 @@ impl Upon<'_> {
         let tolerances = tolerances.filter(|t| t.gain > threshold).cloned();
         // One name with as much evidence as many small errors is the more likely.
         let least = screening.of_names + threshold;
-        if let Some(leading) = tolerances.as_ref().filter(|t| t.gain > least) {
+        let leading = tolerances.as_ref().filter(|t| t.gain > least);
+        if let Some(leading) = leading {
             progress.note("fitting tolerances");
             let mut set = leading.beside(self.base, self.candidates);
             set.fit(self.context, (self.breadth.rounds[1], progress))?;
-            progress.end();
-            return Ok(screening.round(self, screened, (Vec::new(), vec![set]), tolerances));
+            if progress.is_stopped() || self.earns_its_place(&set)? {
+                progress.end();
+                return Ok(screening.round(self, screened, (Vec::new(), vec![set]), tolerances));
+            }
         }
-        let mut raced = self.race(&screening.look, tolerances.as_ref())?;
+        // Tolerances that led the screening and have failed do not take part.
+        let rivals = tolerances.as_ref().filter(|_| leading.is_none());
+        let mut raced = self.race(&screening.look, rivals)?;
         let beside = self.beside_tolerances(tolerances.as_ref(), &raced.sets)?;
         raced.sets.extend(beside);
         let of_race = raced.sets.iter().map(|s| s.candidates.clone()).collect();
@@ -157,6 +165,13 @@ impl Upon<'_> {
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());
         Ok(screening.round(self, screened, (of_race, confirmed), tolerances))
+    }
+
+    /// Whether a fitted set exceeds the base by the threshold and makes up for as much as a further
+    /// name must.
+    fn earns_its_place(&self, set: &Set) -> Result<bool> {
+        let (sets, threshold) = ((self.base, set), self.threshold());
+        Ok(self.open_loop.rises(self.context, sets, threshold)? && self.counts(self.base, set)?)
     }
 
     /// Name of a screened set, as users see it.

@@ -13,9 +13,9 @@ use asid_core::Result;
 use crate::latent_force::fit::{Slopes, rise};
 use crate::latent_force::screen::{Pairs, Screened};
 
-use super::prior::worth;
-use super::prune::change_without;
+use super::prior::{log_prior, worth};
 use super::round::Upon;
+use super::savage_dickey::change_without;
 use super::screening::Look;
 use super::set::{Set, name_of, shared_values, simplest_first, without};
 use super::tolerances::Tolerances;
@@ -124,7 +124,8 @@ impl Upon<'_> {
     pub(super) fn in_order(&self, mut sets: Vec<Set>) -> Vec<Set> {
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         sets.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
-        simplest_first(&mut sets, rise(self.context));
+        let prior = |set: &Set| log_prior(self.context.plant(), self.candidates, &set.candidates);
+        simplest_first(&mut sets, rise(self.context), &prior);
         sets
     }
 

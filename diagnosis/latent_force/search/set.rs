@@ -19,6 +19,10 @@ use super::names::Names;
 /// the threshold: 95 %.
 const WANDER: f64 = 2.0;
 
+/// Share of a prior's variance by which a posterior must be narrower for the logs to show the value:
+/// less is rounding.
+const NARROWER: f64 = 1e-6;
+
 /// A fitted set of effects.
 #[derive(Clone, Debug)]
 pub struct Set {
@@ -55,6 +59,23 @@ impl Set {
         ahead.fitted.evidence - self.fitted.evidence <= unsure.max(rise)
     }
 
+    /// Number of its fitted values of which the logs show anything.
+    ///
+    /// The others are as uncertain as their priors, such as an axis of an effect that its sensor
+    /// does not have.
+    pub(super) fn values_shown(&self) -> usize {
+        let fitted = &self.fitted;
+        let free = fitted.hypothesis.free();
+        if fitted.covariance.nrows() != free.len() {
+            return free.len();
+        }
+        let is_shown = |k: &usize| {
+            let prior = fitted.hypothesis.unknowns[free[*k]].deviation.powi(2);
+            fitted.covariance[(*k, *k)] < (1.0 - NARROWER) * prior
+        };
+        (0..free.len()).filter(is_shown).count()
+    }
+
     /// Continues its fit from its present state, to the given extent.
     pub(super) fn fit<'p>(
         &mut self,
@@ -76,16 +97,17 @@ impl Set {
 /// Moves the simplest of the sets that the evidence does not separate from the first one to the
 /// front.
 ///
-/// The sets come in descending order of evidence. The simplest set has the fewest values, and no
-/// more names than the first. For example, a tilt and a constant force are equivalent for a single
-/// ball, and the one with fewer values comes first.
-pub(super) fn simplest_first(sets: &mut [Set], rise: f64) {
+/// The sets come in descending order of worth. The simplest set has the fewest values that the logs
+/// show, no more names than the first, and is at least as likely by `prior`, the logarithm of its
+/// prior odds. For example, a tilt and a constant force are equivalent for a single ball, and the
+/// one with fewer values comes first.
+pub(super) fn simplest_first(sets: &mut [Set], rise: f64, prior: &dyn Fn(&Set) -> f64) {
     let Some(first) = sets.first() else { return };
-    let values = |s: &Set| s.fitted.hypothesis.free().len();
-    let level = sets.iter().enumerate();
-    let most = first.names.count();
-    let level = level.filter(|(_, s)| s.names.count() <= most && s.is_level_with(first, rise));
-    if let Some((place, _)) = level.min_by_key(|(_, s)| values(s)) {
+    let (most, least) = (first.names.count(), prior(first));
+    let is_level =
+        |s: &Set| s.names.count() <= most && s.is_level_with(first, rise) && prior(s) >= least;
+    let level = sets.iter().enumerate().filter(|(_, s)| is_level(s));
+    if let Some((place, _)) = level.min_by_key(|(_, s)| s.values_shown()) {
         sets[..=place].rotate_right(1);
     }
 }
@@ -197,7 +219,10 @@ fn values_of(set: &Set, candidates: &[Candidate], which: usize) -> Option<Range<
 }
 
 /// Replaces the simpler law of a set by a finer law that was added beside it, and which takes over
-/// its values.
+/// its values with their priors.
+///
+/// What the simpler law leaves gives the widths of the finer law's priors. For a value that was the
+/// simpler law's, such a prior would be narrower than the value is large.
 pub(super) fn refined(set: &Set, candidates: &[Candidate], [finer, simpler]: [usize; 2]) -> Set {
     let mut set = set.clone();
     let places = [finer, simpler].map(|c| values_of(&set, candidates, c));
@@ -212,7 +237,11 @@ pub(super) fn refined(set: &Set, candidates: &[Candidate], [finer, simpler]: [us
         for (name, of) in candidates[finer].effect.takes_over() {
             if let (Some(to), Some(from)) = (named(finer, name), named(simpler, of)) {
                 let (to, from) = (own.start + to, theirs.start + from);
-                let [low, high] = hypothesis.unknowns[to].bounds;
+                let simple = &hypothesis.unknowns[from];
+                let prior = (simple.center, simple.deviation);
+                let fine = &mut hypothesis.unknowns[to];
+                (fine.center, fine.deviation) = prior;
+                let [low, high] = fine.bounds;
                 theta[to] = (theta[to] + theta[from]).clamp(low, high);
             }
         }
@@ -263,5 +292,56 @@ mod tests {
         let group = by_hand::set(&candidates, (&[&[0, 1]], &[]), 9.0);
         assert_eq!(count(&group, &[0]), (1, values));
         assert_eq!(count(&group, &[0, 1]), (0, 0));
+    }
+
+    /// Symptom: a Stribeck friction lost some twenty nats to the dry friction that it refines.
+    /// Cause: its sliding friction of 2 N, taken over from the dry friction, had a prior as narrow
+    /// as the force that was still missing beside the dry friction.
+    #[test]
+    fn a_value_that_is_taken_over_keeps_its_prior() {
+        let labels = ["coulomb-friction@slide", "stribeck-friction@slide"];
+        let candidates = labels.map(by_hand::candidate);
+        let mut both = by_hand::set(&candidates, (&[&[0], &[1]], &[]), 9.0);
+        let place = |set: &Set, name: &str| {
+            let unknowns = &set.fitted.hypothesis.unknowns;
+            let place = unknowns.iter().position(|u| u.parameter.name == name);
+            place.expect("the set has it")
+        };
+        let dry = place(&both, "coulomb-friction@slide.force");
+        let sliding = place(&both, "stribeck-friction@slide.coulomb");
+        let fitted = &mut both.fitted;
+        (fitted.theta[dry], fitted.theta[sliding]) = (2.0, -0.1);
+        fitted.hypothesis.unknowns[dry].deviation = 2.5;
+        fitted.hypothesis.unknowns[sliding].deviation = 0.3;
+        let fine = refined(&both, &candidates, [1, 0]);
+        let sliding = place(&fine, "stribeck-friction@slide.coulomb");
+        let unknown = &fine.fitted.hypothesis.unknowns[sliding];
+        assert_eq!(fine.fitted.theta[sliding], 1.9);
+        assert!((unknown.distance(1.9) - 1.9 / 2.5).abs() < 1e-12);
+        assert_eq!(fine.candidates, [1]);
+    }
+
+    /// Symptom: of a tilt and a wrong zero of an encoder, which logs did not separate, the tilt
+    /// came first as the simpler one. Cause: the zero's three entries for vectors counted as values,
+    /// although an encoder has none of them.
+    #[test]
+    fn the_simplest_set_has_the_fewest_values_that_logs_show() {
+        let labels = ["joint-stiffness@a", "sensor-bias@q"];
+        let candidates = labels.map(by_hand::candidate);
+        // The logs show all values of the first, and one of the second.
+        let mut spring = by_hand::set(&candidates, (&[&[0]], &[]), 90.2);
+        spring.fitted.covariance *= 0.01;
+        let mut zero = by_hand::set(&candidates, (&[&[1]], &[]), 90.0);
+        zero.fitted.covariance[(0, 0)] = 0.01;
+        let values = zero.fitted.hypothesis.free().len();
+        assert!(values > spring.values_shown() && zero.values_shown() == 1);
+        let first = |prior: &dyn Fn(&Set) -> f64| {
+            let mut sets = vec![spring.clone(), zero.clone()];
+            simplest_first(&mut sets, 0.5, prior);
+            sets[0].candidates[0]
+        };
+        assert_eq!(first(&|_| 0.0), 1);
+        // A simpler set that is less likely a priori stays behind.
+        assert_eq!(first(&|s| if s.candidates == [1] { -2.3 } else { 0.0 }), 0);
     }
 }

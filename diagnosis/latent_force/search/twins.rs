@@ -155,9 +155,8 @@ impl Search<'_> {
     /// Whether a twin has fewer values than the set that stands, is at least as likely a priori,
     /// and is not separated from it by the evidence.
     fn is_simpler(&self, twin: &Set, best: &Set) -> bool {
-        let values = |s: &Set| s.fitted.hypothesis.free().len();
         let prior = |s: &Set| log_prior(self.context.plant(), self.candidates, &s.candidates);
-        values(twin) < values(best)
+        twin.values_shown() < best.values_shown()
             && prior(twin) >= prior(best)
             && twin.is_level_with(best, rise(self.context))
     }

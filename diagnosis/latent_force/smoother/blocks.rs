@@ -22,6 +22,35 @@ pub(super) struct Blocks {
     entries: Vec<Vec<usize>>,
 }
 
+/// Returns whether the readings of an episode tell of the force at each degree of freedom: whether
+/// its block has one that is present.
+pub(super) fn told(problem: Problem<'_>, noise: &NoiseModel) -> Vec<bool> {
+    let (linear, b) = (problem.linear, problem.b);
+    let nv = noise.q.len();
+    let nx = 2 * nv;
+    let mut joined = Joined::new(nv);
+    let rows = linear.a.chunks_exact(nx).zip(b.chunks_exact(nv));
+    for (row, (a, b)) in rows.enumerate() {
+        joined.couple(a, Some(row % nv));
+        joined.couple(b, Some(row % nv));
+        if joined.sets() == 1 {
+            break;
+        }
+    }
+    let mut read = vec![false; nv];
+    for (h, residual) in linear.h.chunks_exact(nx).zip(&linear.residual) {
+        joined.couple(h, None);
+        if residual.is_finite() {
+            depends(h).for_each(|place| read[place % nv] = true);
+        }
+    }
+    let mut told = vec![false; nv];
+    for d in (0..nv).filter(|&d| read[d]) {
+        told[joined.root(d)] = true;
+    }
+    (0..nv).map(|d| told[joined.root(d)]).collect()
+}
+
 impl Blocks {
     /// Finds the blocks of an episode; `None` if it is a single block.
     pub(super) fn of(problem: Problem<'_>, noise: &NoiseModel) -> Option<Self> {

@@ -181,7 +181,8 @@ fn frames(
 ) -> Vec<Option<Frame>> {
     const KINDS: [&str; 4] = ["framepos", "framequat", "framelinvel", "frameangvel"];
     let frame = |sensor: &mjcf_rs::extras::Sensor| {
-        if !KINDS.contains(&sensor.kind.as_str()) || sensor.refname.is_some() {
+        let cut = sensor.cutoff.is_some_and(|cutoff| cutoff > 0.0);
+        if !KINDS.contains(&sensor.kind.as_str()) || sensor.refname.is_some() || cut {
             return None;
         }
         let name = sensor.objname.as_deref()?;

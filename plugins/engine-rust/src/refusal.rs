@@ -4,6 +4,7 @@
 //! silently ignores something that changes the motion.
 
 use asid_core::{Scene, mjcf_rs};
+use asid_mjcf::document::is_of_higher_order;
 use roxmltree::{Document, Node};
 
 /// Sections of a document that this engine reads, or that contain no physics.
@@ -22,6 +23,31 @@ const SECTIONS: [&str; 12] = [
     "custom",
 ];
 
+/// Attributes of `<compiler>` that the parser applies, or that find files. Others change masses.
+const COMPILER: [&str; 8] = [
+    "angle",
+    "autolimits",
+    "eulerseq",
+    "coordinate",
+    "assetdir",
+    "meshdir",
+    "texturedir",
+    "strippath",
+];
+
+/// Elements of bodies that this engine reads, or that contain no physics. Others make more bodies.
+const PARTS: [&str; 9] = [
+    "body",
+    "frame",
+    "inertial",
+    "joint",
+    "freejoint",
+    "geom",
+    "site",
+    "camera",
+    "light",
+];
+
 /// Attributes of `<option>` that this engine reads, or that concern the numerics of other engines.
 const OPTIONS: [&str; 11] = [
     "timestep",
@@ -38,6 +64,8 @@ const OPTIONS: [&str; 11] = [
 ];
 
 /// Describes what this engine lacks for a document; `None` if it can simulate all of it.
+///
+/// It reads the document for what the parser skips, and the parsed model for the rest.
 #[must_use]
 pub fn lacking(scene: &Scene, model: &mjcf_rs::Model) -> Option<String> {
     of_document(scene).or_else(|| of_bodies(model))
@@ -53,19 +81,40 @@ fn of_document(scene: &Scene) -> Option<String> {
         if !SECTIONS.contains(&name) && elements(section) {
             return Some(format!("this engine has no <{name}>"));
         }
-        if name != "option" {
-            continue;
-        }
+        let known = match name {
+            "option" => &OPTIONS[..],
+            "compiler" => &COMPILER[..],
+            "worldbody" => match section.descendants().skip(1).find_map(strange) {
+                Some(what) => return Some(what),
+                None => continue,
+            },
+            _ => continue,
+        };
         let mut attributes = section.attributes();
-        if let Some(other) = attributes.find(|a| !OPTIONS.contains(&a.name())) {
-            return Some(format!("this engine has no <option {}>", other.name()));
+        if let Some(other) = attributes.find(|a| !known.contains(&a.name())) {
+            return Some(format!("this engine has no <{name} {}>", other.name()));
         }
-        if let Some(flag) = section.children().find(Node::is_element) {
-            let name = flag.tag_name().name();
-            return Some(format!("this engine has no <{name}> of <option>"));
+        if let Some(part) = section.children().find(Node::is_element) {
+            let part = part.tag_name().name();
+            return Some(format!("this engine has no <{part}> of <{name}>"));
         }
     }
     None
+}
+
+/// Describes what this engine lacks for an element of a body, except for values that the parser
+/// resolves.
+fn strange(node: Node<'_, '_>) -> Option<String> {
+    let name = node.tag_name().name();
+    if node.is_element() && !PARTS.contains(&name) {
+        return Some(format!("this engine has no <{name}> in a body"));
+    }
+    let aligned = node.attribute("align").is_some_and(|a| a == "true");
+    let curved = ["stiffness", "damping"]
+        .iter()
+        .any(|a| node.attribute(*a).is_some_and(is_of_higher_order));
+    (aligned || curved)
+        .then(|| format!("this engine has free joints without options, unlike <{name}>"))
 }
 
 fn of_bodies(model: &mjcf_rs::Model) -> Option<String> {
@@ -84,7 +133,10 @@ fn of_bodies(model: &mjcf_rs::Model) -> Option<String> {
                 joint.frictionloss,
             ]
         };
-        if body.joints.iter().flat_map(forces).any(|x| x != 0.0) {
+        let timed = |joint: &mjcf_rs::body::Joint| joint.springdamper.unwrap_or_default();
+        let all = body.joints.iter();
+        let mut all = all.clone().flat_map(forces).chain(all.flat_map(timed));
+        if all.any(|x| x != 0.0) {
             return Some(format!(
                 "body `{name}`: this engine has no springs, dampers, friction or armature of joints"
             ));

@@ -4,7 +4,6 @@ use anyhow::Result;
 use asid_comparison::cell::CellKey;
 use asid_comparison::document::Document;
 use asid_comparison::method::Method;
-use asid_comparison::plan::MATCHED;
 use asid_comparison::preset;
 use asid_comparison::settings::{canonical, hash};
 use asid_core::registry::{self, AlgorithmEntry, Entry, TaskEntry, find};
@@ -50,9 +49,8 @@ impl Arm {
         for (setting, value) in trained {
             common.set.push(format!("{setting}={value:?}"));
         }
-        if key.world != MATCHED {
-            common.set.push(format!("real.world={:?}", key.world));
-        }
+        // A matched world is named as well: settings that make it another are then refused.
+        common.set.push(format!("real.world={:?}", key.world));
         let levels = difficulty::levels(&*task, &common)?;
         let task = difficulty::at(task, &levels)?;
         let resolve = |common: &Common| -> Result<Config> {
@@ -86,6 +84,7 @@ impl Arm {
 /// The method's parts with the given settings that apply to them.
 fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Table {
     let mut settings = document.settings.clone();
+    forget_explorer_of_run(&mut settings);
     let explorer = method.explores().then_some(&*method.explorer);
     let identifier = method.identifies().then_some(&*method.identifier);
     keep::<dyn Explorer>(&mut settings, task, "explorer", explorer);
@@ -96,7 +95,11 @@ fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Tab
             .entry(section)
             .or_insert_with(|| toml::Value::Table(toml::Table::new()));
         if let Some(section) = section.as_table_mut() {
-            section.entry(key).or_insert(value.into());
+            let entry = section.entry(key).or_insert(value.into());
+            // A run's file has an empty text where the run chose for itself.
+            if entry.as_str() == Some("") {
+                *entry = value.into();
+            }
         }
     };
     let parts = [
@@ -134,6 +137,21 @@ fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Tab
         put("identifier", "network", SHIPPED);
     }
     settings
+}
+
+/// Removes the explorer that an identifier learns from, where it is only that of the run whose
+/// settings these are: each method has its own.
+fn forget_explorer_of_run(settings: &mut toml::Table) {
+    let named = |section: &str, key: &str| settings.get(section)?.get(key).cloned();
+    let of_run = named("explorer", "name");
+    let learned_from = named("identifier", "explorer");
+    if learned_from.is_some()
+        && learned_from == of_run
+        && let Some(identifier) = settings.get_mut("identifier")
+        && let Some(identifier) = identifier.as_table_mut()
+    {
+        identifier.remove("explorer");
+    }
 }
 
 /// Reduces a section to the settings that concern the algorithm `part`.
@@ -206,6 +224,39 @@ mod tests {
         assert_eq!(
             (&*asid.explorer, &*asid.identifier, &*asid.solver),
             (ASID.explorer, ASID.identifier, ASID.solver)
+        );
+    }
+
+    /// Symptom: from the configuration of a run of `asid-estimator`, the method `maxmi` had the
+    /// estimator of the other's episodes, and learned explorers trained in every run where nothing
+    /// ships. Cause: what the run had chosen for itself counted as chosen for all methods.
+    #[test]
+    fn what_a_run_chose_for_itself_is_not_chosen_for_every_method() {
+        let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
+        let of = |text: &str, method: &str| {
+            let plan = "[compare]\nmethods = []\nworlds = []\nbackends = []\nfirst_seed = 0\n\
+                        seeds = 1\ntask = []\n";
+            let mut settings: toml::Table = format!("{plan}{text}").parse().unwrap();
+            let plan = Document::plan_of(&mut settings).unwrap().unwrap();
+            let document = Document { plan, settings };
+            of_method(&document, &*task, &Method::named(method).unwrap())
+        };
+        let run = "[explorer]\nname = 'fisher-ppo'\npolicy = ''\n\
+                   [identifier]\nname = 'estimator'\nexplorer = 'fisher-ppo'\nnetwork = ''";
+        for (method, explorer) in [("maxmi", "maxmi"), ("asid-estimator", "fisher-ppo")] {
+            let settings = of(run, method);
+            assert_eq!(settings["explorer"]["name"].as_str(), Some(explorer));
+            assert_eq!(settings["explorer"]["policy"].as_str(), Some(SHIPPED));
+            assert_eq!(settings["identifier"]["explorer"].as_str(), Some(explorer));
+            assert_eq!(settings["identifier"]["network"].as_str(), Some(SHIPPED));
+        }
+        // What is set for all methods stays.
+        let set = "[identifier]\nexplorer = 'random'\nnetwork = 'a.safetensors'";
+        let settings = of(set, "maxmi");
+        assert_eq!(settings["identifier"]["explorer"].as_str(), Some("random"));
+        assert_eq!(
+            settings["identifier"]["network"].as_str(),
+            Some("a.safetensors")
         );
     }
 

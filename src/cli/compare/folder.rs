@@ -76,8 +76,9 @@ pub struct Contents {
     pub cells: Vec<Cell>,
     /// Why other cells are absent, in the plan's order.
     pub failures: Vec<Failure>,
-    /// Number of cells without result or failure.
-    pub missing: usize,
+    /// Places in the plan of cells without result or failure; those of an arm that cannot be run do
+    /// not count.
+    pub missing: Vec<usize>,
 }
 
 impl Contents {
@@ -99,24 +100,25 @@ impl Contents {
 pub fn contents(store: &Store, keys: &[CellKey]) -> Result<Contents> {
     let (mut cells, mut failures): (Vec<Cell>, Vec<Failure>) = (Vec::new(), Vec::new());
     let mut open = Vec::new();
-    for key in keys {
+    for (place, key) in keys.iter().enumerate() {
         match (store.cell(key)?, store.failure(key)?) {
             (Some(cell), _) => cells.push(cell),
             (None, Some(failure)) => failures.push(failure),
-            (None, None) => open.push(key),
+            (None, None) => open.push((place, key)),
         }
     }
     let mut there = Contents {
         cells,
         failures,
-        missing: 0,
+        missing: Vec::new(),
     };
     // If an arm cannot be run, the failure of one cell stands for all.
     let ruled_out = |key: &CellKey| {
         let mut failures = there.failures.iter();
         failures.any(|f| f.key.arm_mate(key) && there.rules_out(f))
     };
-    there.missing = open.into_iter().filter(|k| !ruled_out(k)).count();
+    open.retain(|(_, key)| !ruled_out(key));
+    there.missing = open.into_iter().map(|(place, _)| place).collect();
     Ok(there)
 }
 

@@ -141,7 +141,7 @@ fn figures(result: &ComparisonResult, runs: &[Run], group: [&str; 3]) -> Vec<Fig
         .layer(
             Layer::dots(dots(&|r| {
                 let found = r.parameters.get(i)?;
-                r.residual.map(|_| found.estimate - found.truth)
+                r.identifies().then_some(found.estimate - found.truth)
             }))
             .colour(Colour::Blue),
         );

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use asid_comparison::document::Document;
 use asid_comparison::method::Method;
-use asid_comparison::plan::{MATCHED, Plan, TaskPlan};
+use asid_comparison::plan::{Plan, TaskPlan};
 use asid_comparison::preset;
 use asid_core::registry::{
     self, BackendEntry, Entry as _, ExplorerEntry, IdentifierEntry, Origin, SolverEntry, TaskEntry,
@@ -13,13 +13,15 @@ use asid_effects::EffectSpec;
 
 use super::Arguments;
 use super::methods::methods;
+use super::of_run::{OfRun, unnamed_world};
 use crate::cli::plugins::{file_of, recorded, used};
-use crate::cli::settings::{
-    PRIOR, check_condition, default_backend, read_table, seed, set, text, wrong,
-};
+use crate::cli::settings::{PRIOR, check_condition, default_backend, read_table, set, wrong};
 
 /// The requested comparison. The command line overrides the configuration, which overrides a table
 /// of the paper, which overrides the defaults.
+///
+/// Settings of a single run (`seed`, `backend`, `condition`, `real.world`, `task`), from `--set` or
+/// from a run's configuration, override the plan of a comparison's configuration.
 pub fn document(arguments: &Arguments) -> Result<Document> {
     let mut settings = match &arguments.config {
         Some(path) => read_table(path)?,
@@ -39,31 +41,29 @@ pub fn document(arguments: &Arguments) -> Result<Document> {
         None => base,
     };
     let quick = arguments.quick || base.as_ref().is_some_and(|b| b.quick);
-    let list = |given: &[String], base: Option<&Vec<String>>, other: Vec<String>| {
-        let first = (!given.is_empty()).then(|| given.to_vec());
-        first.or(base.cloned()).unwrap_or(other)
+    let list = |given: &[String], of_run: Option<String>, base: Option<&Vec<String>>| {
+        let given = (!given.is_empty()).then(|| given.to_vec());
+        given.or(of_run.map(|one| vec![one])).or(base.cloned())
     };
-    let backend = of_run.backend.unwrap_or_else(default_backend);
-    let world = of_run.world.unwrap_or_else(|| MATCHED.to_owned());
+    let of_base = base.as_ref().map(|b| &b.backends);
+    let backends = list(&arguments.backend, of_run.backend, of_base);
+    let backends = backends.unwrap_or_else(|| vec![default_backend()]);
+    let of_base = base.as_ref().map(|b| &b.worlds);
+    let worlds = match list(&arguments.world, of_run.world, of_base) {
+        Some(worlds) => worlds,
+        None => vec![unnamed_world(&settings, &backends)?],
+    };
     let mut plan = Plan {
         table: base.as_ref().and_then(|b| b.table),
         quick,
         train: arguments.train || base.as_ref().is_some_and(|b| b.train),
         methods: methods(&arguments.method, base.as_ref())?,
-        worlds: list(
-            &arguments.world,
-            base.as_ref().map(|b| &b.worlds),
-            vec![world],
-        ),
-        backends: list(
-            &arguments.backend,
-            base.as_ref().map(|b| &b.backends),
-            vec![backend],
-        ),
+        worlds,
+        backends,
         first_seed: arguments
             .seed
-            .or(base.as_ref().map(|b| b.first_seed))
             .or(of_run.seed)
+            .or(base.as_ref().map(|b| b.first_seed))
             .unwrap_or(0),
         seeds: arguments
             .seeds
@@ -212,49 +212,6 @@ fn subtable<'t>(table: &'t mut toml::Table, key: &str) -> Result<&'t mut toml::T
         .ok_or_else(|| wrong(key, "is not a section of settings"))
 }
 
-/// Settings of a single run that the plan takes over, because they vary among the cells.
-#[derive(Default)]
-struct OfRun {
-    task: Option<String>,
-    condition: Option<String>,
-    backend: Option<String>,
-    world: Option<String>,
-    seed: Option<u64>,
-}
-
-impl OfRun {
-    fn take(settings: &mut toml::Table) -> Result<Self> {
-        let text = |table: &mut toml::Table, key: &str| -> Result<Option<String>> {
-            let found = text(table, key);
-            table.remove(key);
-            found
-        };
-        text(settings, "command")?;
-        let seed = seed(settings)?;
-        settings.remove("seed");
-        let backend = text(settings, "backend")?;
-        let world = match settings.get_mut("real").and_then(toml::Value::as_table_mut) {
-            None => None,
-            Some(real) => {
-                // A run's file names the engine of its real world even where it is the simulator's.
-                if backend.is_some()
-                    && real.get("backend").and_then(|b| b.as_str()) == backend.as_deref()
-                {
-                    real.remove("backend");
-                }
-                text(real, "world")?
-            }
-        };
-        Ok(Self {
-            task: text(settings, "task")?,
-            condition: text(settings, "condition")?,
-            backend,
-            world,
-            seed,
-        })
-    }
-}
-
 /// The tasks with their conditions.
 fn tasks(
     arguments: &Arguments,
@@ -268,9 +225,9 @@ fn tasks(
         let message = format!("the configuration is for `{of_run}`, the command for `{other}`");
         return Err(wrong("task", message));
     }
-    let names: Vec<String> = match (&*arguments.tasks, base, of_run) {
-        ([], Some(base), _) => base.task.iter().map(|t| t.name.clone()).collect(),
-        ([], None, Some(task)) => vec![task],
+    let names: Vec<String> = match (&*arguments.tasks, of_run, base) {
+        ([], Some(task), _) => vec![task],
+        ([], None, Some(base)) => base.task.iter().map(|t| t.name.clone()).collect(),
         ([], None, None) => {
             let all = registry::all::<TaskEntry>();
             all.iter().map(|t| t.name.to_owned()).collect()
@@ -282,9 +239,9 @@ fn tasks(
         .map(|name| {
             let all = (find::<TaskEntry>(&name)?.make)()?.conditions();
             let of_base = base.and_then(|b| b.task.iter().find(|t| t.name == name));
-            let conditions = match (&*arguments.condition, of_base, &condition) {
-                ([], Some(task), _) => task.conditions.clone(),
-                ([], None, Some(one)) => vec![one.clone()],
+            let conditions = match (&*arguments.condition, &condition, of_base) {
+                ([], Some(one), _) => vec![one.clone()],
+                ([], None, Some(task)) => task.conditions.clone(),
                 // A task without conditions of its own runs over its prior.
                 ([], None, None) if all.is_empty() => vec![PRIOR.to_owned()],
                 ([], None, None) => all.iter().map(|c| c.name.clone()).collect(),

@@ -8,20 +8,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::Result;
+use asid_comparison::shard::Shard;
 use asid_comparison::store::no_writer;
 use asid_core::Error;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::iterator::Signals;
 
 use crate::cli::failure;
+use crate::cli::interrupt::INTERRUPTED;
 
-/// Exit status of a process that did not finish its work.
+/// Exit status after SIGTERM: the work is not finished.
 const STOPPED: i32 = 1;
 
-/// Text that says how to resume a comparison.
-pub fn how_to_go_on(out: &Path) -> String {
+/// Text that says how to resume a comparison, or a share of it.
+pub fn how_to_go_on(out: &Path, shard: Option<Shard>) -> String {
     let out = out.display();
-    format!("`asid compare --config {out}/config.toml --out {out}` goes on with it")
+    let share = shard.map_or(String::new(), |s| format!(" --shard {s}"));
+    format!("`asid compare --config {out}/config.toml --out {out}{share}` goes on with it")
 }
 
 /// The comparison to stop: the line that says how to resume it, and the flag that stops new cells.
@@ -37,11 +40,11 @@ static WATCHED: Mutex<Option<Watched>> = Mutex::new(None);
 ///
 /// # Errors
 /// When the system refuses to.
-pub fn watch(out: &Path) -> Result<Arc<AtomicBool>> {
+pub fn watch(out: &Path, shard: Option<Shard>) -> Result<Arc<AtomicBool>> {
     let failed = |e: std::io::Error| Error::Failed(format!("cannot watch for signals: {e}"));
     let drain = Arc::new(AtomicBool::new(false));
     let watched = Watched {
-        line: format!("stopped; {}", how_to_go_on(out)),
+        line: format!("stopped; {}", how_to_go_on(out, shard)),
         drain: Arc::clone(&drain),
     };
     let before = current().replace(watched);
@@ -71,6 +74,24 @@ fn stop(signal: i32) {
         // Let a file that is being written finish, and begin no other.
         let _held = no_writer();
         failure::note(&watched.line);
-        signal_hook::low_level::exit(STOPPED);
+        let status = match signal {
+            SIGINT => INTERRUPTED,
+            _ => STOPPED,
+        };
+        signal_hook::low_level::exit(status);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: a share that was stopped named a command that would run all shares.
+    #[test]
+    fn a_share_goes_on_as_a_share() {
+        let shard = "2/4".parse::<Shard>().unwrap();
+        let line = how_to_go_on(Path::new("a"), Some(shard));
+        assert!(line.contains("--out a --shard 2/4`"), "{line}");
+        assert!(!how_to_go_on(Path::new("a"), None).contains("--shard"));
     }
 }

@@ -1,19 +1,21 @@
 //! The work of a comparison, from the command line to the tables.
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
 use asid_comparison::cell::{CellKey, Failure};
 use asid_comparison::document::Document;
 use asid_comparison::schedule;
+use asid_comparison::shard::Shard;
 use asid_comparison::store::{Store, write};
 use asid_core::Error;
 
 use super::arm::Arm;
-use super::folder::{SummedUp, claim, contents, sum_up};
+use super::folder::{Contents, SummedUp, claim, contents, sum_up};
 use super::methods::missing_part;
 use super::request::document;
-use super::resume::{pending, same_comparison};
+use super::resume::{check_versions, left_aside, pending, same_comparison};
 use super::signals::{how_to_go_on, watch};
 use super::train::Trainer;
 use super::worker::Worker;
@@ -59,14 +61,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
     probe(&keys, &arms)?;
     let store = claim(arguments.out.as_deref())?;
     same_comparison(arguments, &store, &document)?;
-    if !document.plan.train {
-        // Report cells that do not belong here before anything is written.
+    // Report cells that do not belong here before anything is written.
+    if document.plan.train {
+        check_versions(&store, &keys)?;
+    } else {
         pending(arguments, &store, &keys, &arms)?;
     }
+    left_aside(&store, &keys)?;
     write(&store.config(), &document.text()?)?;
-    let drain = watch(store.root())?;
+    let drain = watch(store.root(), arguments.shard)?;
     if document.plan.train {
-        train(arguments, &store, &document, &keys, &mut arms)?;
+        train(arguments, &store, &document, (&keys, &mut arms), &drain)?;
+        if drain.load(Ordering::SeqCst) {
+            return finish(arguments, &store, &document, &keys, None);
+        }
     }
     for arm in arms.values().flatten() {
         store.keep_settings(&arm.hash, &arm.canonical)?;
@@ -82,7 +90,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome> {
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
     let work = |key: &CellKey| worker.run(key);
-    let done = |key: &CellKey, result| worker.done(key, result);
+    let done = |key: &CellKey, result| {
+        if !worker.done(key, result) {
+            // What cannot be stored need not be computed.
+            drain.store(true, Ordering::SeqCst);
+        }
+    };
     schedule::run(&pending, threads, &drain, work, done)?;
     let first = worker.end()?;
     finish(arguments, &store, &document, &keys, first)
@@ -99,12 +112,14 @@ pub fn check(document: &Document) -> Result<()> {
 }
 
 /// Trains what learns, once for all cells that use it; what cannot be trained is ruled out.
+///
+/// No further training begins once `drain` is set.
 fn train(
     arguments: &Arguments,
     store: &Store,
     document: &Document,
-    keys: &[CellKey],
-    arms: &mut Arms,
+    (keys, arms): (&[CellKey], &mut Arms),
+    drain: &AtomicBool,
 ) -> Result<()> {
     let trainer = Trainer {
         store,
@@ -120,6 +135,9 @@ fn train(
         };
         if done.contains(&name) {
             continue;
+        }
+        if drain.load(Ordering::SeqCst) {
+            break;
         }
         let method = arm.method.clone();
         let trained = match trainer.train(arm, key) {
@@ -180,17 +198,10 @@ fn finish(
 ) -> Result<Outcome> {
     let there = contents(store, keys)?;
     let counted = format!("{} of {} runs are there", there.cells.len(), keys.len());
-    if there.missing > 0 {
-        let how = how_to_go_on(store.root());
-        let of_share = |(place, key): (usize, &CellKey)| -> Result<bool> {
-            let mine = arguments.shard.is_some_and(|s| s.holds(place));
-            Ok(mine && store.cell(key)?.is_none() && store.failure(key)?.is_none())
-        };
-        let mut open = 0;
-        for entry in keys.iter().enumerate() {
-            open += usize::from(of_share(entry)?);
-        }
-        let Some(shard) = arguments.shard.filter(|_| open == 0) else {
+    if !there.missing.is_empty() {
+        let how = how_to_go_on(store.root(), arguments.shard);
+        let is_done = |s: &Shard| !there.missing.iter().any(|&place| s.holds(place));
+        let Some(shard) = arguments.shard.filter(is_done) else {
             return Err(Error::Failed(format!("stopped; {counted}; {how}")).into());
         };
         failure::note(&format!(
@@ -200,17 +211,34 @@ fn finish(
         ));
         return Ok(Outcome {
             summed: None,
-            failed: None,
+            failed: failed_runs(&there, keys, |place| shard.holds(place)),
         });
     }
     if there.cells.is_empty() {
         let nothing = || Error::Failed("no run could be done".into()).into();
         return Err(first.unwrap_or_else(nothing));
     }
-    let summed = sum_up(store, document, &there)?;
-    // A method that is left out with a reason is no failure; a failed run is.
-    let failed: Vec<&Failure> = there.single_failures().collect();
-    let error = failed.first().map(|failure| {
+    // Processes that write into one folder may have begun at the same time.
+    check_versions(store, keys)?;
+    Ok(Outcome {
+        summed: Some(sum_up(store, document, &there)?),
+        failed: failed_runs(&there, keys, |_| true),
+    })
+}
+
+/// The failed runs at places that are `counted`, as one error. A method that is left out with a
+/// reason is no failure.
+fn failed_runs(
+    there: &Contents,
+    keys: &[CellKey],
+    counted: impl Fn(usize) -> bool,
+) -> Option<anyhow::Error> {
+    let place = |failure: &Failure| keys.iter().position(|key| *key == failure.key);
+    let failed = there.single_failures();
+    let failed: Vec<&Failure> = failed
+        .filter(|failure| place(failure).is_some_and(&counted))
+        .collect();
+    failed.first().map(|failure| {
         Error::Failed(format!(
             "{} of {} runs failed, the first of them {}: {}; the same command tries them again",
             failed.len(),
@@ -219,9 +247,48 @@ fn finish(
             failure.reason
         ))
         .into()
-    });
-    Ok(Outcome {
-        summed: Some(summed),
-        failed: error,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: a share ended well, though one of its runs had failed. Cause: failures were told
+    /// only where the whole comparison was there.
+    #[test]
+    fn a_share_tells_of_its_own_failed_runs() {
+        let key = |seed: u64| CellKey {
+            task: "t".into(),
+            condition: "c".into(),
+            method: "dr".into(),
+            world: "matched".into(),
+            backend: "b".into(),
+            seed,
+        };
+        let failed = |seed: u64, of_all: bool| Failure {
+            key: key(seed),
+            reason: "why".into(),
+            of_all,
+        };
+        let keys = [0, 1, 2, 3].map(key);
+        let of = |failures: Vec<Failure>, share: &str| {
+            let there = Contents {
+                cells: Vec::new(),
+                failures,
+                missing: Vec::new(),
+            };
+            let share: Shard = share.parse().unwrap();
+            let error = failed_runs(&there, &keys, |place| share.holds(place));
+            error.map(|e| e.to_string())
+        };
+        let said = of(vec![failed(1, false), failed(3, false)], "2/2").unwrap();
+        assert!(
+            said.starts_with("2 of 4 runs failed") && said.contains("seed 1: why"),
+            "{said}"
+        );
+        assert_eq!(of(vec![failed(1, false)], "1/2"), None);
+        // A method that cannot be run at all is left out.
+        assert_eq!(of(vec![failed(0, true)], "1/2"), None);
+    }
 }

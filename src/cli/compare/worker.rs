@@ -73,22 +73,26 @@ impl<'w> Worker<'w> {
         }
     }
 
-    /// Stores the result of a cell.
+    /// Stores the result of a cell; returns whether it could be stored.
     pub fn done(
         &self,
         key: &CellKey,
         result: Result<Result<Option<(Cell, f64)>>, schedule::Panic>,
-    ) {
+    ) -> bool {
         let panicked = |panic: schedule::Panic| Error::Failed(failure::of_panic(&*panic)).into();
         let kept = match result.unwrap_or_else(|panic| Err(panicked(panic))) {
             Ok(None) => Ok(()),
             Ok(Some((cell, wall_s))) => self.store.keep(&cell, Some(wall_s)),
             Err(error) => self.failed(key, error),
         };
-        if let Err(error) = kept {
-            self.trouble().unwritten.get_or_insert(error.into());
-        }
         self.progress.advance(key);
+        match kept {
+            Ok(()) => true,
+            Err(error) => {
+                self.trouble().unwritten.get_or_insert(error.into());
+                false
+            }
+        }
     }
 
     /// Records why a cell failed. A wrong call in an arm's first cell is wrong for all.
@@ -124,5 +128,36 @@ impl<'w> Worker<'w> {
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         trouble.unwritten.map_or(Ok(trouble.first), Err)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: on a full disk a comparison computed all of its runs and kept none. Cause: only its
+    /// end told of a result that could not be stored.
+    #[test]
+    fn a_result_that_cannot_be_stored_is_told_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = CellKey {
+            task: "t".into(),
+            condition: "c".into(),
+            method: "dr".into(),
+            world: "matched".into(),
+            backend: "b".into(),
+            seed: 0,
+        };
+        let lost = |root: &std::path::Path| {
+            let (store, arms, keys) = (Store::new(root), Arms::new(), [key.clone()]);
+            let worker = Worker::new(&store, &arms, &keys, true, 1);
+            let result = worker.run(&key);
+            let stored = worker.done(&key, Ok(result));
+            (stored, worker.end().is_err())
+        };
+        assert_eq!(lost(&folder.path().join("a")), (true, false));
+        // A file where the folder should be.
+        std::fs::write(folder.path().join("b"), "").unwrap();
+        assert_eq!(lost(&folder.path().join("b")), (false, true));
     }
 }

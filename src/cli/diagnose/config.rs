@@ -1,5 +1,6 @@
 //! The settings of a diagnosis.
 
+mod checks;
 mod search;
 mod study;
 
@@ -11,7 +12,6 @@ use asid_core::Capabilities;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
 use asid_diagnosis::diagnose::Settings;
 use asid_diagnosis::settings::{Breadth, FALSE_ALARMS};
-use asid_effects::EffectEntry;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -207,34 +207,10 @@ impl Config {
         config.experiments = arguments.experiments.or(config.experiments);
         config.seeds = arguments.seeds.or(config.seeds);
         config.minutes = arguments.minutes.or(config.minutes).or(Some(MINUTES));
-        if config.minutes.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
-            return Err(wrong("--minutes", "is a number above 0"));
-        }
         config.false_alarms = arguments.false_alarms.unwrap_or(config.false_alarms);
-        if !(config.false_alarms > 0.0 && config.false_alarms < 1.0) {
-            return Err(wrong(
-                "--false-alarms",
-                "is a probability between 0 and 1, such as 0.01",
-            ));
-        }
         config.calibrate |= arguments.calibrate;
         config.without.extend(arguments.without.iter().cloned());
-        for name in &config.without {
-            find::<EffectEntry>(name)?;
-        }
-        if config.search.has_a_zero() {
-            return Err(wrong("search", "every number is at least 1"));
-        }
-        if config.task.is_none() && common.preset.is_some() {
-            return Err(wrong("--preset", "goes with a task"));
-        }
-        if !config.train.is_empty() && config.experiments.is_some_and(|n| n > 0) {
-            return Err(wrong(
-                "--experiments",
-                "are played in the simulated real world that the logs come from, and these logs are given: leave out \
-                 --experiments, or `train`",
-            ));
-        }
+        config.check(arguments)?;
         if runs_task {
             config.runs.get_or_insert(RUNS);
             config.logs.get_or_insert_default();
@@ -245,16 +221,8 @@ impl Config {
                     "at least 2: one to fit to and one to hold out",
                 ));
             }
-        } else if config.runs.is_some()
-            || config.seeds.is_some()
-            || config.experiments.is_some()
-            || arguments.describes_a_run()
-        {
-            return Err(wrong(
-                "--task",
-                "a study's machine cannot be run from here: --runs, --seeds, algorithms and what \
-                 describes a simulated real world go with --task",
-            ));
+        } else {
+            config.refuse_runs(arguments)?;
         }
         Ok((config, runs_task.then_some(of_run)))
     }

@@ -6,7 +6,7 @@ mod shown;
 use std::path::Path;
 
 use anyhow::Result;
-use asid_comparison::rows::Row;
+use asid_comparison::rows::{ComparisonResult, Row};
 use asid_core::Error;
 use asid_core::difficulty::Difficulty;
 use asid_statistics as statistics;
@@ -74,15 +74,18 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
         ],
     );
     let mut points: Vec<(f64, Vec<Point>)> = Vec::new();
+    let mut notes = Vec::new();
     for level in levels {
         let assigned = format!("{}={level}", setting.name);
         let folder = kept.join(&assigned);
         let result = (request.compare)(name, &format!("difficulty.{assigned}"), &folder)?;
         data.rows.extend(result.rows.iter().map(|r| csv(level, r)));
+        left_out(&result, &mut notes);
         points.push((level, pooled(&result.rows)));
     }
     let unit = &setting.unit;
     let mut drawing = Drawing {
+        notes,
         data: vec![data],
         panels: vec![
             success(&setting, &points),
@@ -106,6 +109,20 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
         }));
     }
     Ok(drawing)
+}
+
+/// Adds a note for each method that was left out at a level; the same one of several levels counts
+/// once.
+fn left_out(result: &ComparisonResult, notes: &mut Vec<String>) {
+    for o in &result.omitted {
+        let note = format!(
+            "Left out: {} on {}, {}, {}: {}",
+            o.method, o.task, o.world, o.backend, o.reason
+        );
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
 }
 
 /// The chosen difficulty out of `all` that the task has, with its levels.

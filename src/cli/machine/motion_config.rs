@@ -160,16 +160,6 @@ impl Config {
     }
 
     fn check(&self) -> Result<()> {
-        // A motion of a single command leaves nothing to search.
-        if self.period > 0.5 * self.seconds {
-            return Err(wrong(
-                "period",
-                format!(
-                    "{} s is longer than half of the motion of {} s: a motion has several commands",
-                    self.period, self.seconds
-                ),
-            ));
-        }
         for (key, value, least) in [
             ("seconds", self.seconds, f64::MIN_POSITIVE),
             ("period", self.period, f64::MIN_POSITIVE),
@@ -179,11 +169,22 @@ impl Config {
             ("rest_seconds", self.rest_seconds, 0.0),
         ] {
             if !(value.is_finite() && value >= least) {
+                let domain = if least > 0.0 { "above 0" } else { "from 0 up" };
                 return Err(wrong(
                     key,
-                    format!("{value} is out of its domain: a number above 0"),
+                    format!("{value} is out of its domain: a number {domain}"),
                 ));
             }
+        }
+        // A motion of a single command leaves nothing to search.
+        if self.period > 0.5 * self.seconds {
+            return Err(wrong(
+                "period",
+                format!(
+                    "{} s is longer than half of the motion of {} s: a motion has several commands",
+                    self.period, self.seconds
+                ),
+            ));
         }
         for (name, std) in &self.noise {
             if !(std.is_finite() && *std > 0.0) {

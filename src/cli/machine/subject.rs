@@ -84,15 +84,9 @@ impl Subject {
 
     /// The study, for commands that need logs.
     pub fn needs_study(&self) -> Result<&Study> {
-        self.study.as_ref().ok_or_else(|| {
-            Error::File {
-                path: self.file.clone(),
-                message: "is a model without logs: a study is needed, a TOML file with `model` and `train`, or a folder \
-                          with study.toml"
-                    .into(),
-            }
-            .into()
-        })
+        self.study
+            .as_ref()
+            .ok_or_else(|| no_study(&self.file).into())
     }
 
     /// `name version` of the engine.
@@ -114,6 +108,16 @@ fn open_first_rows(model: &dyn Model, plant: &Plant, study: &mut Study) -> Resul
     let logs = study.train.iter_mut().chain(&mut study.test);
     logs.for_each(|(_, episode)| followers.open(episode));
     Ok(())
+}
+
+/// The error for the file of a model where a study is needed.
+pub fn no_study(model: &Path) -> Error {
+    let message = "is a model without logs: a study is needed, a TOML file with `model` and `train`, or a folder with study.toml; \
+                   `asid import LOG… --model FILE --out DIR` makes one";
+    Error::File {
+        path: model.to_owned(),
+        message: message.into(),
+    }
 }
 
 /// Whether a path names a study rather than a model.

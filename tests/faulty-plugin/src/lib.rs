@@ -24,6 +24,7 @@ enum Fault {
     AttemptPanics,
     AttemptFails,
     CommandsPanic,
+    LocateIsLong,
 }
 
 /// `payload-swing` with a fault.
@@ -52,6 +53,7 @@ faulty_tasks! {
     "attempt-panics": AttemptPanics,
     "attempt-fails": AttemptFails,
     "commands-panic": CommandsPanic,
+    "locate-is-long": LocateIsLong,
 }
 
 asid_core::register!(TaskEntry {
@@ -70,7 +72,11 @@ impl Task for Faulty {
     }
 
     fn locate(&self, signals: &[f64]) -> Vec<f64> {
-        self.inner.locate(signals)
+        let mut start = self.inner.locate(signals);
+        if self.fault == Fault::LocateIsLong {
+            start.push(0.0);
+        }
+        start
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {

@@ -182,17 +182,13 @@ pub unsafe extern "C" fn status(
             message: "the batch is gone".into(),
         };
         let first = usize::try_from(first).unwrap_or(usize::MAX);
+        let end = first.saturating_add(out.len());
+        let asked = |all: &[Status]| all[first.min(all.len())..end.min(all.len())].to_vec();
         let known = Held::new(batch)
-            .and_then(|held| held.run(|s| Ok(s.status().to_vec())))
+            .and_then(|held| held.run(|s| Ok(asked(s.status()))))
             .unwrap_or_default();
         for (i, place) in out.iter_mut().enumerate() {
-            write_status(
-                first
-                    .checked_add(i)
-                    .and_then(|n| known.get(n))
-                    .unwrap_or(&lost),
-                place,
-            );
+            write_status(known.get(i).unwrap_or(&lost), place);
         }
         Ok(())
     };

@@ -194,6 +194,11 @@ pub fn list(xml: &Document<'_>, model: &Model) -> Vec<String> {
             found.push(labelled("actuator", actuator.name.as_deref(), "gear"));
         }
     }
+    for joint in model.bodies.iter().flat_map(|entry| &entry.body.joints) {
+        if (joint.springdamper).is_some_and(|s| s.iter().any(|x| *x != 0.0)) {
+            found.push(labelled("joint", joint.name.as_deref(), "springdamper"));
+        }
+    }
     for geom in model.bodies.iter().flat_map(|entry| &entry.body.geoms) {
         let shape = match geom.type_ {
             GeomType::Mesh => "mesh",
@@ -263,8 +268,10 @@ fn attributes(node: Node<'_, '_>, element: &str, known: &[&str], found: &mut Vec
             || POSE.contains(&name)
             || (element == "option" && PRECISION.contains(&name))
             || at_rest(name, value);
-        // The mesh of a geom is reported with its shape, after defaults are resolved.
-        let found_elsewhere = element.ends_with("geom") && ["mesh", "hfield"].contains(&name);
+        // The mesh of a geom is reported with its shape, after defaults are resolved, and so is what
+        // a class says of joints that may overrule it.
+        let found_elsewhere = (element.ends_with("geom") && ["mesh", "hfield"].contains(&name))
+            || (element, name) == ("default/joint", "springdamper");
         if !carried && !found_elsewhere {
             found.push(labelled(element, node.attribute("name"), name));
         }
@@ -279,6 +286,9 @@ fn at_rest(name: &str, value: &str) -> bool {
         "cone" => value == "pyramidal",
         "impratio" => numbers.all(|n| n == Ok(1.0)),
         "settotalmass" => numbers.all(|n| n.is_ok_and(|n| n <= 0.0)),
+        "inertiagrouprange" => numbers.eq([Ok(0.0), Ok(5.0)]),
+        // Group 0 is that of elements without one.
+        "actuatorgroupdisable" => value.trim().is_empty(),
         "align" => value == "false" || value == "auto",
         _ if name.starts_with("sol") || name.starts_with("o_") => false,
         _ => {

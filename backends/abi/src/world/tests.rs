@@ -289,6 +289,51 @@ fn frames_and_classes_are_resolved() {
     near(geom.pos, [0.0, 0.0, 1.0]);
 }
 
+/// Symptom: an engine in C counted the mass of geoms that the document leaves out, and drove what
+/// it switches off. Cause: zeros were taken for the default, which for lists of groups they are not.
+#[test]
+fn groups_that_are_left_out_are_listed() {
+    let world = read(
+        r#"<compiler inertiagrouprange="0 0"/><option actuatorgroupdisable="0"/><worldbody/>"#,
+    );
+    assert_eq!(
+        left_out(&world),
+        ["compiler inertiagrouprange", "option actuatorgroupdisable"]
+    );
+    let defaults =
+        read(r#"<compiler inertiagrouprange="0 5"/><option actuatorgroupdisable=""/><worldbody/>"#);
+    assert_eq!(left_out(&defaults), Vec::<String>::new());
+}
+
+/// Symptom: engines in C refused an exported model for a class's `springdamper`. Cause: the class
+/// was read without the joint, whose zeros overrule it.
+#[test]
+fn a_time_constant_of_a_spring_counts_where_a_joint_has_it() {
+    let world = |joints: &str| {
+        read(&format!(
+            r#"<default><joint springdamper="0.5 0.3"/></default><worldbody><body><geom size="1"/>{joints}</body></worldbody>"#
+        ))
+    };
+    let overruled = world(r#"<joint name="j" springdamper="0 0"/>"#);
+    assert_eq!(left_out(&overruled), Vec::<String>::new());
+    let one = world(r#"<joint name="j" springdamper="0 0"/><joint name="k"/>"#);
+    assert_eq!(left_out(&one), ["joint/k springdamper"]);
+    let own = world(r#"<joint name="j" springdamper="1 1"/>"#);
+    assert_eq!(left_out(&own), ["joint/j springdamper"]);
+}
+
+#[test]
+fn what_a_drive_adds_to_its_joint_is_listed() {
+    let world = read(
+        r#"<default><position armature="0.1"/></default><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
+        <actuator><motor name="m" joint="j" damping="0.2"/><position name="p" joint="j" damping="0 0"/></actuator>"#,
+    );
+    assert_eq!(
+        left_out(&world),
+        ["default/position armature", "actuator/m damping"]
+    );
+}
+
 #[test]
 fn coefficients_of_higher_order_are_listed() {
     let world = read(

@@ -7,15 +7,13 @@ use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Missing;
-use crate::latent_force::search::prune::change_without;
+use crate::latent_force::search::prune::TANGENT;
+use crate::latent_force::search::savage_dickey::change_without;
 use crate::latent_force::search::set::{Set, without};
 use crate::settings::Breadth;
 
 use super::{DEVIATIONS, Member, Tolerances, deviation_within};
 
-/// Largest predicted loss, in thresholds, at which a set is refitted without a name: first-order
-/// predictions are right to a factor of about three.
-const TANGENT: f64 = 3.0;
 /// Fraction of a tolerance from which on a value counts as being at its end.
 const AT_END: f64 = 0.95;
 

@@ -8,6 +8,7 @@ use asid_core::registry::{TaskEntry, find};
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
 
+use super::super::super::machine::{is_study, no_study};
 use super::super::super::model::{self, Needs};
 use super::super::super::session::backend;
 use super::super::super::settings::{difficulty, wrong};
@@ -17,6 +18,7 @@ impl Config {
     /// The study: as written, or of a task with the logs that the settings name or with `played`.
     pub fn study(&self, played: Option<Logs>) -> Result<Study> {
         match (&self.study, &self.task) {
+            (Some(path), _) if is_model(path)? => Err(no_study(path).into()),
             (Some(path), _) => Ok(Study::read_with(path, self.model.as_deref())?),
             (None, Some(name)) => {
                 let task = difficulty::at((find::<TaskEntry>(name)?.make)()?, &self.difficulty)?;
@@ -42,6 +44,12 @@ impl Config {
             (None, None) => Err(wrong("study", "is missing")),
         }
     }
+}
+
+/// Whether a path names the file of a model, MJCF or TOML, and no study.
+fn is_model(path: &Path) -> Result<bool> {
+    let ending = path.extension().is_some_and(|e| e == "xml" || e == "toml");
+    Ok(ending && path.is_file() && !is_study(path)?)
 }
 
 /// Logs to fit and logs held out, with their names.

@@ -48,21 +48,22 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether any is given.
-    pub fn any(&self) -> bool {
-        let lists = [
-            &self.unknown,
-            &self.nuisance,
-            &self.limit_position,
-            &self.limit_speed,
-            &self.limit_force,
-            &self.limit_box,
-            &self.may_touch,
-            &self.noise,
+    /// Name of the first of these options that is given; `None` where none is.
+    pub fn first(&self) -> Option<&'static str> {
+        let given = [
+            ("--unknown", !self.unknown.is_empty()),
+            ("--nuisance", !self.nuisance.is_empty()),
+            ("--objective", self.objective.is_some()),
+            ("--seconds", self.seconds.is_some()),
+            ("--period", self.period.is_some()),
+            ("--limit-position", !self.limit_position.is_empty()),
+            ("--limit-speed", !self.limit_speed.is_empty()),
+            ("--limit-force", !self.limit_force.is_empty()),
+            ("--limit-box", !self.limit_box.is_empty()),
+            ("--may-touch", !self.may_touch.is_empty()),
+            ("--noise", !self.noise.is_empty()),
         ];
-        lists.iter().any(|l| !l.is_empty())
-            || self.objective.is_some()
-            || self.seconds.is_some()
-            || self.period.is_some()
+        let first = given.iter().find(|(_, is_given)| *is_given);
+        first.map(|(name, _)| *name)
     }
 }
