@@ -68,16 +68,22 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
-/// A batch of three in the middle of its motion, and a snapshot of that moment.
-fn midway(backend: &dyn Backend) -> Result<(Rig, Snapshot)> {
+/// A batch of three in the middle of its motion.
+fn midway(backend: &dyn Backend) -> Result<Rig> {
     let mut rig = stirred(backend, 3, 1)?;
     roll(&mut rig, &[0, 1, 2], 60, 2)?;
+    Ok(rig)
+}
+
+/// A batch of three in the middle of its motion, and a snapshot of that moment.
+fn saved(backend: &dyn Backend) -> Result<(Rig, Snapshot)> {
+    let mut rig = midway(backend)?;
     let snapshot = rig.simulator.save(&[0, 1, 2])?;
     Ok((rig, snapshot))
 }
 
 fn restored(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, snapshot) = midway(backend)?;
+    let (mut rig, snapshot) = saved(backend)?;
     let first = roll(&mut rig, &[0, 1, 2], 60, 2)?;
     roll(&mut rig, &[0, 2], 10, 1)?;
     rig.simulator.load(&snapshot, &[0, 1, 2], &[0, 1, 2])?;
@@ -86,7 +92,7 @@ fn restored(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn restored_elsewhere(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, snapshot) = midway(backend)?;
+    let (mut rig, snapshot) = saved(backend)?;
     let first = roll(&mut rig, &[0, 1, 2], 60, 2)?;
     let mut other = rig.another(3, 2)?;
     roll(&mut other, &[1], 25, 1)?;
@@ -96,7 +102,7 @@ fn restored_elsewhere(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn snapshot_rows(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, snapshot) = midway(backend)?;
+    let (mut rig, snapshot) = saved(backend)?;
     let before = rig.read()?;
     roll(&mut rig, &[0, 1, 2], 10, 1)?;
     rig.simulator.load(&snapshot, &[2, 0], &[0, 1])?;
@@ -106,14 +112,14 @@ fn snapshot_rows(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn copied(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, _) = midway(backend)?;
+    let mut rig = midway(backend)?;
     rig.simulator.copy_state(&[1, 1], &[0, 2])?;
     let rows = rig.run(60, &rig.command(0.9))?;
     Ok(differing_bits(&rows[..60], &rows[60..120]) + differing_bits(&rows[..60], &rows[120..]))
 }
 
 fn set_state(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, _) = midway(backend)?;
+    let mut rig = midway(backend)?;
     let mut fresh = batch(backend, 1, 1)?;
     let (qpos, qvel) = elsewhere(rig.simulator.layout());
     rig.place(&qpos, &qvel)?;
@@ -126,7 +132,7 @@ fn set_state(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn reset(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, _) = midway(backend)?;
+    let mut rig = midway(backend)?;
     rig.simulator.reset(&[0, 1, 2])?;
     let used = roll(&mut rig, &[0, 1, 2], 80, 2)?;
     let new = roll(&mut batch(backend, 3, 1)?, &[0, 1, 2], 80, 2)?;
@@ -183,8 +189,8 @@ fn batch_equals_single(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn subset(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, _) = midway(backend)?;
-    let (mut other, _) = midway(backend)?;
+    let mut rig = midway(backend)?;
+    let mut other = midway(backend)?;
     let before = rig.read()?;
     roll(&mut rig, &[0, 2], 40, 2)?;
     let after = rig.read()?;
@@ -214,8 +220,8 @@ fn parallel(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn reading(backend: &dyn Backend) -> Result<f64> {
-    let (mut rig, _) = midway(backend)?;
-    let (mut other, _) = midway(backend)?;
+    let mut rig = midway(backend)?;
+    let mut other = midway(backend)?;
     let mut looked = Vec::new();
     for _ in 0..10 {
         let read = rig.read()?;

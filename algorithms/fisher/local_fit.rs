@@ -255,7 +255,7 @@ impl LocalFit {
             lower = implied(&precision, &columns)?;
             inflated = inflation(&precision, &columns, &self.luck, self.freedom, &lower)?;
         }
-        let narrowing = narrowing(&lower, &inflated)?;
+        let (narrowing, _) = narrowing(&lower, &inflated)?;
         let curvature = precision.weigh(&self.slopes) * columns;
         self.outside(&(narrowing.transpose() * curvature * narrowing))
     }

@@ -106,8 +106,9 @@ pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> 
 /// weights imply.
 ///
 /// `lower` is the factor of `H`, of [`implied`], and `inflation` the matrix of [`inflation`].
+/// Returned with it is the largest inflation of a direction, at least 1.
 #[must_use]
-pub fn narrowing(lower: &DMatrix<f64>, inflation: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+pub fn narrowing(lower: &DMatrix<f64>, inflation: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
     let eigen = symmetric_eigen((inflation + inflation.transpose()) * 0.5)?;
     let axes = eigen.eigenvectors;
     let upper = lower.transpose();
@@ -115,7 +116,8 @@ pub fn narrowing(lower: &DMatrix<f64>, inflation: &DMatrix<f64>) -> Option<DMatr
     for (mut column, v) in narrowed.column_iter_mut().zip(&eigen.eigenvalues) {
         column /= v.max(1.0).sqrt();
     }
-    Some(narrowed * axes.transpose() * upper)
+    let most = eigen.eigenvalues.iter().copied().fold(1.0, f64::max);
+    Some((narrowed * axes.transpose() * upper, most))
 }
 
 fn scale_columns(x: &mut DMatrix<f64>, by: &DVector<f64>) {
@@ -151,7 +153,7 @@ mod tests {
         let precision = Precision::diagonal(&DVector::from_vec(vec![0.5, 1.0, 1.0, 1.0]));
         let lower = implied(&precision, &b).unwrap();
         let inflated = inflation(&precision, &b, &epsilon, 1.0, &lower).unwrap();
-        let back = narrowing(&lower, &inflated).unwrap();
+        let (back, _) = narrowing(&lower, &inflated).unwrap();
         let p = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0 / 1.5, 0.5, 0.5, 0.5]));
         let h = b.transpose() * &p * &b;
         let covariance = DMatrix::identity(4, 4) + epsilon.transpose() * &epsilon;
@@ -176,7 +178,7 @@ mod tests {
         let precision = Precision::diagonal(&DVector::repeat(m, 0.0));
         let lower = implied(&precision, &b).unwrap();
         let inflated = inflation(&precision, &b, &epsilon, 8.0, &lower).unwrap();
-        let back = narrowing(&lower, &inflated).unwrap();
+        let (back, _) = narrowing(&lower, &inflated).unwrap();
         let apart = DVector::from_vec(vec![1.0, -1.0]);
         assert!((&back * &apart - &apart).norm() < 1e-3, "{back}");
         // M / H = 1 + |b|^2 along the sum.

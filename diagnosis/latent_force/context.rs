@@ -61,6 +61,8 @@ pub struct Context<'a> {
     /// variance.
     pub alike: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
+    ///
+    /// It is 1 if all walks are segments: no force is missing along them.
     pub inertial: Vec<f64>,
     /// Sets of degrees of freedom that nothing couples, in the model without further effects.
     pub islands: Islands,
@@ -295,7 +297,7 @@ pub fn begin<'a>(
         position_noise: position_noise(plant, logs),
         reading_variance: noise.iter().zip(&alike).map(|(n, a)| n * n * a).collect(),
         alike,
-        inertial: vec![0.0; nv],
+        inertial: vec![1.0; nv],
         islands: Islands::one(nv, logs.entries.len()),
         walks: taken.walks,
         one_step: false,
@@ -311,15 +313,18 @@ pub fn begin<'a>(
     let as_read = map.readings_at(theta, &context.read)?;
     let all = vec![Some(f64::INFINITY); trajectory.len()];
     map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;
-    let want = Derivatives {
-        force: true,
-        ..Derivatives::default()
-    };
-    let push = vec![PUSH; nv];
-    let linear = map.linearise(theta, &trajectory, want, &push, &[])?;
-    let b: Vec<Vec<f64>> = linear.into_iter().map(|l| l.b).collect();
+    let mut b = vec![Vec::new(); trajectory.len()];
+    if !map.is_all_segments() {
+        let want = Derivatives {
+            force: true,
+            ..Derivatives::default()
+        };
+        let push = vec![PUSH; nv];
+        let linear = map.linearise(theta, &trajectory, want, &push, &[])?;
+        b = linear.into_iter().map(|l| l.b).collect();
+        context.inertial = inertial(&context, &trajectory, &b);
+    }
     context.as_read = as_read;
-    context.inertial = inertial(&context, &trajectory, &b);
     let tau = -row_seconds(&context.walks) / FIRST_CORRELATION.ln();
     let estimate = Estimate {
         noise: NoiseModel {

@@ -38,7 +38,7 @@ pub struct Estimate {
     /// Covariances.
     pub noise: NoiseModel,
     /// Derivatives with respect to generalized forces of the model without effects, one array per
-    /// walk.
+    /// walk; empty if all walks are segments.
     pub b: Vec<Vec<f64>>,
     /// Variance of the free force, `rows x nv`, one array per walk; empty for none.
     ///

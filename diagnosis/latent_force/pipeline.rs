@@ -1,6 +1,7 @@
 //! The whole diagnosis by the missing force: from a study to the input of the report.
 
 mod begin_values;
+mod known_replays;
 mod replays;
 mod rows;
 mod told;
@@ -32,6 +33,7 @@ use super::selection::gather;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
 use begin_values::begin_values;
+use known_replays::KnownReplays;
 use replays::{Replays, replay};
 use rows::{Rows, along};
 use without_effects::{Null, Stands};
@@ -121,6 +123,7 @@ fn leaves_a_gap(null: Null<'_>, stands: &Stands<'_>) -> Result<bool> {
         candidates: &[],
         firsts: &firsts(&stands.context.walks),
         open: Vec::new(),
+        known: KnownReplays::default(),
         progress: null.progress,
     };
     replays.leaves_a_gap(&stands.none)
@@ -152,6 +155,7 @@ fn searched_in(
         candidates: &candidates,
         firsts: &firsts,
         open: Vec::new(),
+        known: KnownReplays::default(),
         progress,
     };
     let excess = |set: &Set| replays.excess(&set.fitted, &set.candidates);
@@ -237,6 +241,7 @@ fn led_by_replays(
         candidates: &[],
         firsts,
         open: Vec::new(),
+        known: KnownReplays::default(),
         progress: null.progress,
     };
     let (left, fitted) = replays.fitted(&Set::without_effects(&none))?;

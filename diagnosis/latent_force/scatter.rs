@@ -42,6 +42,9 @@ pub struct Scatter {
     /// Share of the rows in segments whose readings scatter by more than their noise, among those
     /// with a reading that counts.
     pub lost: f64,
+    /// Linearisation about the trajectory, beyond which the directions are; without derivatives
+    /// with respect to the state along walks that are no segments.
+    pub linear: Vec<LinearEpisode>,
 }
 
 impl Scatter {
@@ -66,7 +69,9 @@ impl Scatter {
             state: true,
             ..Derivatives::default()
         };
+        let segments: Vec<bool> = context.walks.iter().map(|w| w.segment.is_some()).collect();
         let anew = Anew {
+            state: &segments,
             blind: seen.blind(),
             ..Anew::default()
         };
@@ -94,6 +99,7 @@ impl Scatter {
         Ok(Self {
             lost: lost((&directions, all.len()), &here, &estimate.noise.r),
             directions,
+            linear: here,
         })
     }
 }

@@ -1,10 +1,11 @@
 //! The scatter of replays of a segment.
 
 use asid::core::episode::ChannelColumns;
-use asid::core::{Episode, Scene};
+use asid::core::progress::Silent;
+use asid::core::{Episode, Progress, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
-use asid::diagnosis::latent_force::fit::{Hypothesis, Slopes};
+use asid::diagnosis::latent_force::fit::{Hypothesis, Slopes, fit, settle_noise};
 use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::scatter::Scatter;
 use asid::diagnosis::latent_force::step_map::StepMap;
@@ -73,6 +74,19 @@ fn segment(logs: &Logs) -> Vec<Walk> {
     }]
 }
 
+/// What a diagnosis begins with: the log as one segment.
+fn taken(machine: &Machine, logs: &Logs) -> Taken {
+    let walks = segment(logs);
+    Taken {
+        touching: Vec::new(),
+        states: from_readings(&machine.plant, logs, &walks, &[vec![0.0; 2 * ROWS]]),
+        walks,
+        given: vec![None],
+        open: Vec::new(),
+        scale: vec![0.2, 0.5],
+    }
+}
+
 /// Scatter of a slide with the attributes `joint`, as one segment.
 ///
 /// Returns the power of each row in units of the noise, from draws and from half the time step, and
@@ -80,15 +94,7 @@ fn segment(logs: &Logs) -> Vec<Walk> {
 fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
     let machine = slide(joint);
     let logs = logs(&machine);
-    let walks = segment(&logs);
-    let taken = Taken {
-        touching: Vec::new(),
-        states: from_readings(&machine.plant, &logs, &walks, &[vec![0.0; 2 * ROWS]]),
-        walks,
-        given: vec![None],
-        open: Vec::new(),
-        scale: vec![0.2, 0.5],
-    };
+    let taken = taken(&machine, &logs);
     let (context, estimate) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
     let finer = machine.halved().unwrap();
     let model = (&Hypothesis::default(), &[][..]);
@@ -159,4 +165,56 @@ fn a_replay_ends_where_it_leaves_more_than_is_asked_of_it() {
     assert_eq!(left, f64::INFINITY);
     assert!(rows.abs_diff(ROWS / 3) <= 2, "{rows}");
     assert_eq!(roll(None), (0.0, 1));
+}
+
+/// Symptom: a diagnosis of a machine with contact took twice the replays of its initial states.
+/// Cause: a fit computed the derivatives again about which the scatter had just been measured.
+#[test]
+fn a_fit_from_the_derivatives_of_the_scatter_is_the_fit_that_computes_them_again() {
+    let machine = slide(r#"range="-1 0.06" limited="true""#);
+    let logs = logs(&machine);
+    let taken = taken(&machine, &logs);
+    let (context, mut estimate) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
+    let progress: &dyn Progress = &Silent;
+    let model = Hypothesis::default();
+    let slopes = settle_noise(&context, &model, &[], &mut estimate, (2, 2), progress).unwrap();
+    let scatter = Scatter::of(&context, (&model, &[]), (&estimate, &slopes), None).unwrap();
+    let fit_from = |slopes: &Slopes| {
+        let extent = (4_usize, progress);
+        let found = fit(&context, &model, &[], (&estimate, slopes), extent).unwrap();
+        (found.evidence, found.estimate.trajectory)
+    };
+    let known = slopes.taken(&context, (&[], &estimate.trajectory), &scatter.linear);
+    let fitted = fit_from(&known);
+    assert!(fitted.0.is_finite());
+    assert_eq!(fitted, fit_from(&slopes.renewed()));
+    // The fit does begin with them: others lead elsewhere.
+    let mut halved = scatter.linear;
+    halved[0].h.iter_mut().for_each(|h| *h *= 0.5);
+    let known = slopes.taken(&context, (&[], &estimate.trajectory), &halved);
+    assert_ne!(fitted, fit_from(&known));
+}
+
+/// Along a segment no force is missing, so its size is never asked for.
+#[test]
+fn along_segments_nothing_depends_on_the_size_of_a_missing_force() {
+    let machine = slide("");
+    let logs = logs(&machine);
+    let taken = taken(&machine, &logs);
+    let (context, estimate) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
+    assert!(estimate.b.iter().all(Vec::is_empty));
+    let settled = |size: f64| {
+        let mut estimate = estimate.clone();
+        let noise = &mut estimate.noise;
+        let variances = noise.q.iter_mut().chain(&mut noise.white);
+        variances.for_each(|variance| *variance *= size);
+        let model = Hypothesis::default();
+        settle_noise(&context, &model, &[], &mut estimate, (2, 4), &Silent).unwrap();
+        let missing = estimate.missing(&context);
+        assert_eq!((missing.force, missing.share), (0.0, 1.0));
+        (estimate.log_likelihood, estimate.trajectory)
+    };
+    let found = settled(1.0);
+    assert!(found.0.is_finite());
+    assert_eq!(found, settled(1e12));
 }

@@ -519,7 +519,7 @@ fn handles_that_were_destroyed_are_not_found() {
 fn a_later_table_claims_what_this_version_knows() {
     let mut later = *keep(table::<Sound>("an engine"));
     later.abi_minor = 7;
-    later.capabilities |= Capabilities::LIVE_PARAMETERS.bits() | 1 << 40;
+    later.capabilities |= Capabilities::LIVE_PARAMETERS.bits() | (1 << 40);
     // SAFETY: a complete table.
     let engine = unsafe { Engine::from_table(keep(later), Path::new("lib.so")) }.unwrap();
     assert_eq!(engine.capabilities(), FreeFlight.capabilities());

@@ -53,10 +53,11 @@
 //! - `<equality><joint>` couples only joints of one tree, and only linearly.
 //! - The saturation of a servo is judged by the force that it would reach at the end of the step,
 //!   where MuJoCo takes that of the start.
-//! - Not simulated, and refused: actuators with states, `<general>` ones with another law than that
-//!   of a motor, a position or a velocity servo, tendons, flexes, stiffness and damping of higher
-//!   order, meshes, height fields and ellipsoids in contact, fluids, damped free joints, springs
-//!   and limits of ball joints, a `<pair>` whose friction differs by direction. Sensors other than
+//! - Not simulated, and refused: actuators with states, with a damping or an armature of their own,
+//!   `<general>` ones with another law than that of a motor, a position or a velocity servo, groups
+//!   of actuators that are switched off, tendons, flexes, stiffness and damping of higher order,
+//!   meshes, height fields and ellipsoids in contact, fluids, damped free joints, springs and
+//!   limits of ball joints, a `<pair>` whose friction differs by direction. Sensors other than
 //!   positions, orientations and velocities of frames and joints, and sensors with a delay of their
 //!   own, are refused when they are requested.
 //!

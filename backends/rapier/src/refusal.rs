@@ -5,10 +5,10 @@
 //! engine's solver (`solref`, `solimp`, `impratio`, integrators) are not physics of the scene and
 //! pass. The exception is a contact whose damping is so low that it makes bodies bounce.
 
+mod attached;
 mod attribute;
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use asid_core::{Error, Result, Scene};
 use asid_mjcf::document::is_of_higher_order;
@@ -48,8 +48,8 @@ fn refuse(scene: &Scene, message: String) -> Error {
 /// # Errors
 /// [`Error::Scene`], naming the first such part and its line.
 pub fn check(scene: &Scene, model: &Model) -> Result<()> {
-    check_document(scene)?;
-    check_attached(scene)?;
+    check_document(scene, None)?;
+    attached::check(scene)?;
     check_bodies(scene, model)?;
     check_actuators(scene, model)?;
     for equality in &model.equality {
@@ -82,27 +82,8 @@ fn named_kind(node: &Node<'_, '_>) -> Option<&'static str> {
     }
 }
 
-/// Checks the documents that a document attaches, and those that they attach.
-fn check_attached(scene: &Scene) -> Result<()> {
-    if !scene.xml().contains("<attach") {
-        return Ok(());
-    }
-    let document = roxmltree::Document::parse(scene.xml())
-        .map_err(|e| refuse(scene, format!("cannot read it: {e}")))?;
-    let folder = scene.directory().unwrap_or(Path::new(""));
-    let assets = document.descendants().filter(|n| n.has_tag_name("asset"));
-    let models = assets
-        .flat_map(|n| n.children())
-        .filter(|n| n.has_tag_name("model"));
-    for file in models.filter_map(|n| n.attribute("file")) {
-        let attached = Scene::from_file(&folder.join(file))?;
-        check_document(&attached)?;
-        check_attached(&attached)?;
-    }
-    Ok(())
-}
-
-fn check_document(scene: &Scene) -> Result<()> {
+/// Checks the elements of a document; of one that another attaches, those that belong to `bodies`.
+fn check_document(scene: &Scene, bodies: Option<&[&str]>) -> Result<()> {
     let document = roxmltree::Document::parse(scene.xml())
         .map_err(|e| refuse(scene, format!("cannot read it: {e}")))?;
     let place = |node: &Node<'_, '_>| {
@@ -115,7 +96,9 @@ fn check_document(scene: &Scene) -> Result<()> {
         )
     };
     let mut names = HashSet::new();
-    for node in document.descendants().filter(Node::is_element) {
+    let counts = |n: &Node<'_, '_>| bodies.is_none_or(|bodies| attached::is_taken(n, bodies));
+    let elements = document.descendants().filter(Node::is_element);
+    for node in elements.filter(counts) {
         let tag = node.tag_name().name();
         if let (Some(kind), Some(name)) = (named_kind(&node), node.attribute("name"))
             && !names.insert((kind, name))
@@ -132,7 +115,7 @@ fn check_document(scene: &Scene) -> Result<()> {
         if ELEMENTS.contains(&tag) && !in_defaults && (!ambiguous || in_actuators) {
             return Err(refuse(scene, format!("cannot simulate {}", place(&node))));
         }
-        if let Some(attribute) = attribute::refused(&node) {
+        if let Some(attribute) = attribute::refused(&node, bodies.is_some()) {
             let what = format!("cannot honour `{attribute}` of {}", place(&node));
             return Err(refuse(scene, what));
         }

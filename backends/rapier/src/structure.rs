@@ -53,7 +53,7 @@ pub struct BodyValues {
 /// How the mass of each body is determined.
 #[derive(Clone, Debug)]
 pub struct MassModel {
-    /// Per body: the `<inertial>` element, where it counts, or none at all where geoms do not.
+    /// Per body: what the document states; `None` for the mass properties of its geoms.
     inertials: Vec<Option<Inertia>>,
     /// Per body: indices of its geoms.
     geoms_of: Vec<std::ops::Range<usize>>,
@@ -197,9 +197,10 @@ fn direction(axis: [f64; 3]) -> Vector3<f64> {
     axis.try_normalize(0.0).unwrap_or(axis)
 }
 
-/// The `<inertial>` of a body, if the compiler's settings use it.
+/// The mass properties of a body that its geoms do not determine: those of its `<inertial>`, if the
+/// compiler's settings use it.
 ///
-/// A body that states none has no mass where geoms have none (`inertiafromgeom="false"`).
+/// Without one, a body has no mass where geoms have none (`inertiafromgeom="false"`).
 fn inertial(body: &Body, compiler: &Compiler) -> Option<Inertia> {
     let Some(given) = body.inertial.as_ref() else {
         let massless = Inertia {

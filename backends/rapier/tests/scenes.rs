@@ -300,17 +300,29 @@ fn values_that_mean_none_are_let_in() {
 fn what_an_attached_document_says_is_not_passed_over() {
     let folder = std::env::temp_dir().join(format!("asid-rapier-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    let tool = r#"<mujoco><worldbody><body name="tool"><joint name="turn"/><geom size="0.1"/></body></worldbody>
-      <actuator><position name="servo" joint="turn" kp="5" dampratio="1"/></actuator></mujoco>"#;
-    std::fs::write(folder.join("tool.xml"), tool).unwrap();
-    let inside = r#"<asset><model name="tool" file="tool.xml"/></asset><worldbody><body><joint/>
-      <geom size="0.1"/><attach model="tool" body="tool" prefix="a_"/></body></worldbody>"#;
-    let attaching = scene(inside).in_directory(Some(folder.clone()));
-    let refused = Rapier.load(&attaching).map(|_| ());
+    let load = |tool: &str| {
+        let tool = format!("<mujoco>{tool}</mujoco>");
+        std::fs::write(folder.join("tool.xml"), tool).unwrap();
+        let inside = r#"<asset><model name="tool" file="tool.xml"/></asset><worldbody><body><joint/>
+          <geom size="0.1"/><attach model="tool" body="tool" prefix="a_"/></body></worldbody>"#;
+        let attaching = scene(inside).in_directory(Some(folder.clone()));
+        Rapier.load(&attaching).map(|_| ())
+    };
+    let tool = r#"<body name="tool"><joint name="turn"/><geom size="0.1"/></body>"#;
+    let refused = load(&format!(
+        r#"<worldbody>{tool}</worldbody>
+        <actuator><position name="servo" joint="turn" kp="5" dampratio="1"/></actuator>"#
+    ));
+    // Options, the total mass and the other bodies of the attached document stay behind.
+    let taken = load(&format!(
+        r#"<compiler settotalmass="9"/><option viscosity="0.3"><flag gravity="disable"/></option>
+        <worldbody><geom size="1" solref="-40000 -18"/>{tool}</worldbody>"#
+    ));
     std::fs::remove_dir_all(&folder).unwrap();
     let text = refused.unwrap_err().to_string();
     assert!(text.contains("tool.xml: backend"), "{text}");
     assert!(text.contains("`dampratio` of <position> `servo`"), "{text}");
+    assert_eq!(taken.map_err(|e| e.to_string()), Ok(()));
 }
 
 #[test]

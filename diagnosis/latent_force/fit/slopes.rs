@@ -81,6 +81,34 @@ impl Slopes {
         }
     }
 
+    /// Returns the derivatives of a linearisation of the same model, for a fit that begins at its
+    /// values and trajectory; as [`Slopes::renewed`] unless all walks are segments.
+    ///
+    /// The first linearisation of that fit would compute the same ones again. The linearisation has
+    /// left out the blind coordinates.
+    #[must_use]
+    pub fn taken(
+        &self,
+        context: &Context<'_>,
+        (theta, trajectory): (&[f64], &[Vec<f64>]),
+        linear: &[LinearEpisode],
+    ) -> Self {
+        let renewed = self.renewed();
+        let seen = self.blind.iter().filter(|blind| !blind.is_empty()).count();
+        let is_segment = |w: usize| context.walks[w].segment.is_some();
+        if seen < linear.len() || !(0..linear.len()).all(is_segment) {
+            return renewed;
+        }
+        Self {
+            a: vec![Vec::new(); linear.len()],
+            carried: vec![Vec::new(); linear.len()],
+            h: linear.iter().map(|l| l.h.clone()).collect(),
+            first: trajectory.to_vec(),
+            theta: theta.to_vec(),
+            ..renewed
+        }
+    }
+
     /// For each segment: coordinates of its initial state on which its readings do not depend;
     /// empty where unknown.
     #[must_use]

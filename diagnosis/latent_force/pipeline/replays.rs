@@ -19,6 +19,7 @@ use crate::predict::{Point, State};
 use crate::result::NotTried;
 use crate::trajectory::Trajectory;
 
+use super::known_replays::KnownReplays;
 use super::told::{detection_limits, isolability, missing_forces, p_value, ranking};
 
 /// Limit of the physics steps of a replay of all logs times the open coordinates of the initial
@@ -105,6 +106,8 @@ pub(super) struct Replays<'a> {
     pub(super) firsts: &'a [usize],
     /// Coordinates of the initial states that are fitted together with the values.
     pub(super) open: Vec<usize>,
+    /// Replays that were made before.
+    pub(super) known: KnownReplays,
     pub(super) progress: &'a dyn Progress,
 }
 
@@ -161,14 +164,16 @@ impl Replays<'_> {
         point: &Point,
         (fitted, members): (&Fitted, &[usize]),
     ) -> Result<Vec<f64>> {
-        let bench = self.bench;
-        let trials = self.trials(fitted, members);
-        let mut predictor = bench.predictor(&trials, &bench.train)?;
-        let residuals = predictor.residuals(std::slice::from_ref(point))?.pop();
-        let mut residuals = residuals.unwrap_or_default();
-        let scale = (bench.train.readings.max(1) as f64).sqrt();
-        residuals.iter_mut().for_each(|r| *r /= scale);
-        Ok(residuals)
+        self.known.residuals((members, point), || {
+            let bench = self.bench;
+            let trials = self.trials(fitted, members);
+            let mut predictor = bench.predictor(&trials, &bench.train)?;
+            let residuals = predictor.residuals(std::slice::from_ref(point))?.pop();
+            let mut residuals = residuals.unwrap_or_default();
+            let scale = (bench.train.readings.max(1) as f64).sqrt();
+            residuals.iter_mut().for_each(|r| *r /= scale);
+            Ok(residuals)
+        })
     }
 
     /// Fits the values of a set to whole replays from its smoothed initial states, and returns the
@@ -369,6 +374,7 @@ pub(super) fn replay(
         candidates,
         firsts,
         open: Vec::new(),
+        known: KnownReplays::default(),
         progress,
     };
     if replays.steps() * bench.open.len() <= REPLAYED && !progress.is_stopped() {

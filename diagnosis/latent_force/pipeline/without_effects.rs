@@ -177,6 +177,7 @@ impl<'a> Null<'a> {
             FIRST
         };
         let slopes = settle_noise(&context, hypothesis, theta, &mut estimate, first, progress)?;
+        let mut begun = slopes.renewed();
         let mut repeats = None;
         if context.has_segments() {
             let model = (hypothesis, theta);
@@ -190,9 +191,10 @@ impl<'a> Null<'a> {
                 return Ok(Tried::Scatters(found));
             }
             repeats = Some(found);
+            begun = slopes.taken(&context, (theta, &estimate.trajectory), &scatter.linear);
             estimate.scatter = scatter.directions;
         }
-        let from = (&estimate, &slopes.renewed());
+        let from = (&estimate, &begun);
         let rounds = if context.has_segments() {
             SHORT
         } else {

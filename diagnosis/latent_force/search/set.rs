@@ -59,21 +59,22 @@ impl Set {
         ahead.fitted.evidence - self.fitted.evidence <= unsure.max(rise)
     }
 
-    /// Number of its fitted values of which the logs show anything.
+    /// Number of its fitted values of which the logs show anything, then of all its fitted values:
+    /// of two sets, the simpler one has the lesser.
     ///
-    /// The others are as uncertain as their priors, such as an axis of an effect that its sensor
-    /// does not have.
-    pub(super) fn values_shown(&self) -> usize {
+    /// Values that the logs do not show are as uncertain as their priors. Some take no part at all,
+    /// such as an axis of an effect that its sensor does not have, so they count last.
+    pub(super) fn values(&self) -> [usize; 2] {
         let fitted = &self.fitted;
         let free = fitted.hypothesis.free();
         if fitted.covariance.nrows() != free.len() {
-            return free.len();
+            return [free.len(); 2];
         }
         let is_shown = |k: &usize| {
             let prior = fitted.hypothesis.unknowns[free[*k]].deviation.powi(2);
             fitted.covariance[(*k, *k)] < (1.0 - NARROWER) * prior
         };
-        (0..free.len()).filter(is_shown).count()
+        [(0..free.len()).filter(is_shown).count(), free.len()]
     }
 
     /// Continues its fit from its present state, to the given extent.
@@ -107,7 +108,7 @@ pub(super) fn simplest_first(sets: &mut [Set], rise: f64, prior: &dyn Fn(&Set) -
     let is_level =
         |s: &Set| s.names.count() <= most && s.is_level_with(first, rise) && prior(s) >= least;
     let level = sets.iter().enumerate().filter(|(_, s)| is_level(s));
-    if let Some((place, _)) = level.min_by_key(|(_, s)| s.values_shown()) {
+    if let Some((place, _)) = level.min_by_key(|(_, s)| s.values()) {
         sets[..=place].rotate_right(1);
     }
 }
@@ -334,7 +335,7 @@ mod tests {
         let mut zero = by_hand::set(&candidates, (&[&[1]], &[]), 90.0);
         zero.fitted.covariance[(0, 0)] = 0.01;
         let values = zero.fitted.hypothesis.free().len();
-        assert!(values > spring.values_shown() && zero.values_shown() == 1);
+        assert!(values > spring.values()[0] && zero.values() == [1, values]);
         let first = |prior: &dyn Fn(&Set) -> f64| {
             let mut sets = vec![spring.clone(), zero.clone()];
             simplest_first(&mut sets, 0.5, prior);

@@ -156,7 +156,7 @@ impl Search<'_> {
     /// and is not separated from it by the evidence.
     fn is_simpler(&self, twin: &Set, best: &Set) -> bool {
         let prior = |s: &Set| log_prior(self.context.plant(), self.candidates, &s.candidates);
-        twin.values_shown() < best.values_shown()
+        twin.values() < best.values()
             && prior(twin) >= prior(best)
             && twin.is_level_with(best, rise(self.context))
     }

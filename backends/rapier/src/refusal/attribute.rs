@@ -35,10 +35,12 @@ const ATTRIBUTES: [(&str, &str); 28] = [
 ];
 
 /// The attribute of an element that this backend lacks.
-pub(super) fn refused(node: &Node<'_, '_>) -> Option<&'static str> {
-    let mut own = ATTRIBUTES
-        .iter()
-        .filter(|(element, _)| node.has_tag_name(*element));
+///
+/// The total mass that an attached document states counts for nothing, as in MuJoCo.
+pub(super) fn refused(node: &Node<'_, '_>, is_attached: bool) -> Option<&'static str> {
+    let mut own = ATTRIBUTES.iter().filter(|(element, attribute)| {
+        node.has_tag_name(*element) && !(is_attached && *attribute == "settotalmass")
+    });
     let found = own.find(|(_, attribute)| {
         let value = node.attribute(*attribute);
         value.is_some_and(|value| !is_neutral(attribute, value))
