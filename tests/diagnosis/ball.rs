@@ -95,9 +95,9 @@ fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
         panic!("{}", r.sentence);
     };
     // Acceleration along the floor, relative to gravity; the ball has 0.06 kg.
-    let along = match &*named.name {
+    let along = match &*named.effect {
         "gravity-tilt" => named.parameters["pitch"].sin(),
-        "constant-force@ball" => named.parameters["x"] / (0.06 * 9.81),
+        "constant-force" => named.parameters["x"] / (0.06 * 9.81),
         _ => panic!("{}", r.sentence),
     };
     assert!((along - 0.05_f64.sin()).abs() < 0.002, "{along}");
