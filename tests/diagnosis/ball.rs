@@ -91,9 +91,8 @@ fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
     };
     // At twice the ball's time step a bounce differs slightly.
     assert!(r.gap.refined < 0.1 * r.gap.identified, "{:?}", r.gap);
-    let [named] = &r.effects[..] else {
-        panic!("{}", r.sentence);
-    };
+    assert_eq!(r.verdict.effects.len(), 1, "{}", r.sentence);
+    let named = &r.effects[0];
     // Acceleration along the floor, relative to gravity; the ball has 0.06 kg.
     let along = match &*named.effect {
         "gravity-tilt" => named.parameters["pitch"].sin(),
