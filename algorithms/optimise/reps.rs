@@ -129,20 +129,20 @@ mod tests {
     use super::*;
     use asid_core::Streams;
 
+    /// Relative entropy of the draws that a temperature weights, to the draws with equal weights.
+    fn relative_entropy(rewards: &[f64], eta: f64) -> f64 {
+        let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let w: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
+        let total: f64 = w.iter().sum();
+        // sum p log(p n)
+        let shares = w.iter().map(|w| w / total).filter(|p| *p > 0.0);
+        shares.map(|p| p * (p * rewards.len() as f64).ln()).sum()
+    }
+
     #[test]
     fn the_temperature_bounds_the_relative_entropy() {
         let rewards: Vec<f64> = (0..200).map(|i| -0.01 * f64::from(i * i)).collect();
-        let eta = temperature(0.5, &rewards);
-        let max = 0.0;
-        let w: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
-        let total: f64 = w.iter().sum();
-        // KL divergence of the reweighted from the uniform draws: sum p log(p n).
-        let kl: f64 = w
-            .iter()
-            .map(|w| w / total)
-            .filter(|p| *p > 0.0)
-            .map(|p| p * (p * 200.0).ln())
-            .sum();
+        let kl = relative_entropy(&rewards, temperature(0.5, &rewards));
         assert!((kl - 0.5).abs() < 1e-3, "{kl}");
     }
 
@@ -153,15 +153,7 @@ mod tests {
         for max in [0.0, 1e9] {
             let mut rewards: Vec<f64> = (0..200).map(|i| max - 0.01 * f64::from(i * i)).collect();
             rewards.push(max - 1e12);
-            let eta = temperature(0.5, &rewards);
-            let w: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
-            let total: f64 = w.iter().sum();
-            let kl: f64 = w
-                .iter()
-                .map(|w| w / total)
-                .filter(|p| *p > 0.0)
-                .map(|p| p * (p * 201.0).ln())
-                .sum();
+            let kl = relative_entropy(&rewards, temperature(0.5, &rewards));
             assert!((kl - 0.5).abs() < 1e-3, "{kl}");
         }
     }
