@@ -10,6 +10,7 @@
 //! delay, a rotor behind backlash) runs along with its own simulation. Its memory at a row is that
 //! of the trajectory before the row.
 
+mod along;
 mod carried;
 mod late;
 mod linear_episode;
@@ -20,6 +21,7 @@ mod roll;
 mod sensors;
 mod shares;
 mod step;
+mod stretch;
 
 use asid_core::layout::{Layout, Recording};
 use asid_core::{BatchConfig, Model as _, Parameter, Result, Simulator as _};
@@ -57,6 +59,8 @@ struct Common<'a> {
     columns: BatchColumns,
     states: Recording,
     readings: Recording,
+    /// Both in one row: first the state.
+    states_and_readings: Recording,
     /// Largest number of roles in one pass.
     capacity: usize,
     /// Whether a step may depend on time or on earlier states: by an effect on commands, forces or
@@ -90,6 +94,17 @@ impl Common<'_> {
     /// derivatives over single rows.
     fn rolls(&self, walk: usize, want: Derivatives) -> bool {
         self.walks[walk].segment.is_some() && !want.force
+    }
+
+    /// Writes what the log reads at row `k` of a walk less a reading of the model; NaN where it
+    /// does not count.
+    fn residual(&self, (walk, k): (&Walk, usize), read: &[f64], out: &mut [f64]) {
+        let readings = &self.logs.episodes[walk.episode].readings;
+        let logged = &readings[walk.rows[k] * read.len()..(walk.rows[k] + 1) * read.len()];
+        self.logs.reading_difference(logged, read, out);
+        if walk.segment.is_some_and(|lead| k < lead) {
+            out.fill(f64::NAN);
+        }
     }
 
     /// Whether a variation changes only parameters that act in every physics step alike.
@@ -240,6 +255,7 @@ impl<'a> StepMap<'a> {
             states: layout.recording(&names)?,
             islands: Islands::one(layout.nv, logs.entries.len()),
             readings: layout.recording(&logs.channels())?,
+            states_and_readings: layout.recording(&[names, logs.channels()].concat())?,
             logs,
             walks,
             layout,

@@ -1,5 +1,8 @@
 //! One pass along the rows: every simulation is set to the trajectory at each row, read, and
 //! stepped to the next.
+//!
+//! Segments run on from their first row ([`super::along`]). They take a pass only for values of
+//! effects on readings: those simulations follow the unperturbed one and are only read.
 
 use std::collections::BTreeMap;
 
@@ -19,10 +22,11 @@ use super::{Common, LinearEpisode, Request};
 /// Forward differences of smooth dynamics in double precision are right to about six digits.
 pub(super) const STATE_STEP: f64 = 1e-6;
 
-/// What is wanted of a walk: derivatives with respect to its state, columns of all variations, and
-/// the blind coordinates of its initial state.
+/// What is wanted of a walk: whether it is replayed from its first row, derivatives with respect to
+/// its state, columns of all variations, and the blind coordinates of its initial state.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Class<'r> {
+    replayed: bool,
     state: bool,
     columns: bool,
     blind: &'r [bool],
@@ -74,11 +78,12 @@ impl Part {
             };
             let states = in_state.iter().filter(|_| class.state);
             let roles: Vec<Role> = states.chain(&others).copied().filter(wanted).collect();
-            for chunk in roles.chunks(c.capacity - 1) {
-                self.pass(c, request, (chunk, &which), &mut episodes, &mut ramps)?;
+            if class.replayed {
+                self.replay(c, request, (&roles, &which), (&mut episodes, &mut ramps))?;
+                continue;
             }
-            if roles.is_empty() {
-                self.pass(c, request, (&[], &which), &mut episodes, &mut ramps)?;
+            for chunk in chunks(&roles, c.capacity - 1) {
+                self.pass(c, request, (chunk, &which), &mut episodes, &mut ramps)?;
             }
         }
         if late == 1 {
@@ -92,16 +97,42 @@ impl Part {
         Ok(episodes)
     }
 
+    /// Linearises some of its segments in some roles.
+    fn replay(
+        &mut self,
+        c: &Common<'_>,
+        request: Request<'_>,
+        (roles, which): (&[Role], &[bool]),
+        (out, ramps): (&mut [LinearEpisode], &mut [Vec<f64>]),
+    ) -> Result<()> {
+        let (read, stepped): (Vec<Role>, Vec<Role>) =
+            roles.iter().partition(|role| request.is_read_alone(**role));
+        for chunk in read.chunks(c.capacity - 1) {
+            self.pass(c, request, (chunk, which), out, ramps)?;
+        }
+        if read.is_empty() || !stepped.is_empty() {
+            for chunk in chunks(&stepped, c.capacity - 1) {
+                self.along(c, request, (chunk, which), out)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Groups its walks by what is wanted of them, one flag per walk.
     fn classes<'r>(&self, c: &Common<'_>, request: Request<'r>) -> BTreeMap<Class<'r>, Vec<bool>> {
         let mut classes = BTreeMap::new();
         for (e, &w) in self.walks.iter().enumerate() {
             let state = request.want.state && request.due(w);
-            let sees = state && c.rolls(w, request.want);
+            let replayed = c.rolls(w, request.want);
             let class = Class {
+                replayed,
                 state,
                 columns: request.anew.columns.get(w).is_some_and(|due| *due),
-                blind: if sees { request.blind(w) } else { &[] },
+                blind: if state && replayed {
+                    request.blind(w)
+                } else {
+                    &[]
+                },
             };
             let which = classes.entry(class);
             which.or_insert_with(|| vec![false; self.walks.len()])[e] = true;
@@ -118,6 +149,41 @@ impl Part {
         out: &mut [LinearEpisode],
         ramps: &mut [Vec<f64>],
     ) -> Result<()> {
+        let mut row = RowBuffers::default();
+        let (roles, some) = self.begin(c, request, (extra, which), &mut row)?;
+        let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
+        let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
+        for k in 0..longest {
+            let reach = |e: &usize| walks[*e].len() > k;
+            let here: Vec<usize> = some.iter().copied().filter(reach).collect();
+            if k > 0 {
+                self.place(c, &roles, (&here, k), request, &mut row)?;
+            }
+            self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
+            for (substeps, now) in by_substeps(&walks, here, k) {
+                let stepped = Stepped {
+                    roles: &roles,
+                    now: &now,
+                    k,
+                    substeps,
+                };
+                self.step_row(c, stepped, request, out, &mut row)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Resets some walks' simulations, for the unperturbed model and some roles, with their values
+    /// and at their first rows.
+    ///
+    /// Returns the roles, the unperturbed one first, and the walks' places.
+    pub(super) fn begin(
+        &mut self,
+        c: &Common<'_>,
+        request: Request<'_>,
+        (extra, which): (&[Role], &[bool]),
+        row: &mut RowBuffers,
+    ) -> Result<(Vec<Role>, Vec<usize>)> {
         let roles: Vec<Role> = std::iter::once(Role::Nominal)
             .chain(extra.iter().copied())
             .collect();
@@ -138,30 +204,8 @@ impl Part {
         }
         self.reset_at(c, &all, 0)?;
         self.simulator.set_parameters(&all, &columns)?;
-        let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
-        let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
-        let mut row = RowBuffers::default();
-        for k in 0..longest {
-            let reach = |&e: &usize| which[e] && walks[e].len() > k;
-            let here: Vec<usize> = (0..n).filter(reach).collect();
-            self.place(c, &roles, (&here, k), request, &mut row)?;
-            self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
-            for (substeps, now) in by_substeps(&walks, here, k) {
-                let (rolled, placed): (Vec<usize>, Vec<usize>) = now
-                    .into_iter()
-                    .partition(|&e| c.rolls(self.walks[e], request.want));
-                for now in [rolled, placed].iter().filter(|now| !now.is_empty()) {
-                    let stepped = Stepped {
-                        roles: &roles,
-                        now,
-                        k,
-                        substeps,
-                    };
-                    self.step_row(c, stepped, request, out, &mut row)?;
-                }
-            }
-        }
-        Ok(())
+        self.place(c, &roles, (&some, 0), request, row)?;
+        Ok((roles, some))
     }
 
     /// Places all simulations of some episodes at row `k`; those of segments only at the first row,
@@ -234,4 +278,11 @@ impl Part {
         self.begin_anew(c, &row.sims, k)?;
         self.simulator.displace(&row.sims, &row.qpos, &row.qvel)
     }
+}
+
+/// Some roles in groups that a batch holds; without roles, one empty group for the unperturbed
+/// model.
+fn chunks(roles: &[Role], most: usize) -> impl Iterator<Item = &[Role]> {
+    let none = roles.is_empty().then_some(&[][..]);
+    none.into_iter().chain(roles.chunks(most))
 }

@@ -55,14 +55,8 @@ impl Part {
         for (i, &e) in here.iter().enumerate() {
             let nominal = &row.read[i * width..(i + 1) * width];
             let walk = &c.walks[self.walks[e]];
-            let log_row = walk.rows[k];
-            let readings = &c.logs.episodes[walk.episode].readings;
-            let logged = &readings[log_row * width..(log_row + 1) * width];
             let residual = &mut out[e].residual[k * ns..(k + 1) * ns];
-            c.logs.reading_difference(logged, nominal, residual);
-            if walk.segment.is_some_and(|lead| k < lead) {
-                residual.fill(f64::NAN);
-            }
+            c.residual((walk, k), nominal, residual);
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let Ok(at) = read.binary_search(&v) else {
                     if let Role::State(slot) = *role {
@@ -78,16 +72,7 @@ impl Part {
                 let place = at * here.len() + i;
                 let other = &row.read[place * width..(place + 1) * width];
                 c.logs.reading_difference(other, nominal, &mut differ);
-                let segment = c.rolls(self.walks[e], request.want);
                 match *role {
-                    Role::State(i) if segment => {
-                        for (s, d) in differ.iter().enumerate() {
-                            let value = d / request.push[i];
-                            out[e].h[(k * ns + s) * nx + i] =
-                                if value.is_finite() { value } else { 0.0 };
-                        }
-                    }
-                    Role::Reading(_) | Role::Ramp(_) if segment => {}
                     Role::State(slot) if !c.remembers_readings => {
                         for (s, d) in differ.iter().enumerate() {
                             if let Some(i) = c.islands.coordinate_read(slot, s) {

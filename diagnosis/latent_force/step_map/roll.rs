@@ -1,11 +1,15 @@
 //! Replays of short segments from their initial states, and readings there.
 
-use asid_core::{Control, Result, Rollout, Simulator as _};
+use asid_core::{Result, Simulator as _};
 
-use crate::latent_force::walk::{Walk, by_substeps};
+use crate::latent_force::walk::Walk;
 
 use super::Common;
 use super::pass::Part;
+use super::stretch::stretches;
+
+/// Most rows in one rollout: a replay that is no use ends after them.
+const ROWS: usize = 16;
 
 impl Part {
     /// Sets the parameters of some of its walks' simulations, and places them at given states
@@ -52,8 +56,7 @@ impl Part {
         (theta, variance): (&[f64], &[f64]),
         (states, most): (&mut [Vec<f64>], &[Option<f64>]),
     ) -> Result<Vec<f64>> {
-        let (nq, nu) = (c.layout.nq, c.layout.nu());
-        let width = nq + c.layout.nv;
+        let width = c.layout.nq + c.layout.nv;
         let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
         let mut going: Vec<usize> = (0..walks.len())
             .filter(|&e| walks[e].segment.is_some() && most[self.walks[e]].is_some())
@@ -64,52 +67,50 @@ impl Part {
         }
         let first: Vec<&[f64]> = going.iter().map(|&e| &states[e][..width]).collect();
         self.begin_at(c, theta, (&going, &first))?;
-        let (entries, readings) = (c.logs.entries.len(), c.readings.width());
-        let mut read = Vec::new();
-        let mut differ = vec![0.0; entries];
-        let mut next = Vec::new();
-        let longest = going.iter().map(|&e| walks[e].len()).max().unwrap_or(0);
-        for k in 0..longest {
-            going.retain(|&e| walks[e].len() > k);
-            read.resize(going.len() * readings, 0.0);
-            self.simulator.read(&going, &c.readings, &mut read)?;
-            for (&e, read) in going.iter().zip(read.chunks_exact(readings)) {
-                if walks[e].segment.is_some_and(|lead| k < lead) {
-                    continue;
-                }
-                let logged = &c.logs.episodes[walks[e].episode].readings;
-                let at = walks[e].rows[k] * readings;
-                c.logs
-                    .reading_difference(&logged[at..at + readings], read, &mut differ);
-                let present = differ.iter().zip(variance).filter(|(d, _)| !d.is_nan());
-                left[e] += present.map(|(d, v)| d * d / v).sum::<f64>();
+        let mut differ = vec![0.0; c.logs.entries.len()];
+        let mut sum = |e: usize, k: usize, read: &[f64]| {
+            c.residual((walks[e], k), read, &mut differ);
+            let present = differ.iter().zip(variance).filter(|(d, _)| !d.is_nan());
+            present.map(|(d, v)| d * d / v).sum::<f64>()
+        };
+        let limit: Vec<f64> = self.walks.iter().map(|&w| most[w].unwrap_or(0.0)).collect();
+        let readings = c.readings.width();
+        let mut read = vec![0.0; going.len() * readings];
+        self.simulator.read(&going, &c.readings, &mut read)?;
+        for (&e, read) in going.iter().zip(read.chunks_exact(readings)) {
+            left[e] = within(sum(e, 0, read), limit[e]);
+        }
+        let (mut reached, mut rolled) = (vec![0; walks.len()], Vec::new());
+        loop {
+            going.retain(|&e| left[e].is_finite());
+            let next = stretches(&walks, (&going, &reached), ROWS);
+            if next.is_empty() {
+                return Ok(left);
             }
-            going.retain(|&e| {
-                let goes_on = most[self.walks[e]].is_some_and(|most| left[e] <= most);
-                if !goes_on {
-                    left[e] = f64::INFINITY;
-                }
-                goes_on && left[e].is_finite()
-            });
-            for (substeps, now) in by_substeps(&walks, going.clone(), k) {
-                let ctrl: Vec<f64> = now
-                    .iter()
-                    .flat_map(|&e| walks[e].ctrl[k * nu..(k + 1) * nu].to_vec())
-                    .collect();
-                let control = Control::PerSimulation(&ctrl);
-                let rollout = Rollout::new(&now, 1, substeps, control, &c.states);
-                next.resize(now.len() * width, 0.0);
-                self.simulator.rollout(&rollout, &mut next)?;
-                let status = self.simulator.status();
-                for (&e, next) in now.iter().zip(next.chunks_exact(width)) {
-                    if status[e].is_running() && next.iter().all(|x| x.is_finite()) {
-                        states[e][(k + 1) * width..(k + 2) * width].copy_from_slice(next);
-                    } else {
-                        left[e] = f64::INFINITY;
+            for stretch in next {
+                self.roll_on(c, (&stretch, 1), &mut rolled)?;
+                let rows = rolled.chunks_exact(c.states_and_readings.width());
+                for (i, row) in rows.enumerate() {
+                    let e = stretch.walks[i / stretch.rows];
+                    let (state, read) = row.split_at(width);
+                    if !left[e].is_finite() {
+                        continue;
                     }
+                    if !state.iter().all(|x| x.is_finite()) {
+                        left[e] = f64::INFINITY;
+                        continue;
+                    }
+                    reached[e] += 1;
+                    let k = reached[e];
+                    states[e][k * width..(k + 1) * width].copy_from_slice(state);
+                    left[e] = within(left[e] + sum(e, k, read), limit[e]);
                 }
             }
         }
-        Ok(left)
     }
+}
+
+/// The sum, or infinity beyond the limit.
+fn within(sum: f64, limit: f64) -> f64 {
+    if sum <= limit { sum } else { f64::INFINITY }
 }
