@@ -20,14 +20,14 @@
 //! The scatter in `J` itself adds `2 tr(P R) (U^T U)^-1` to `H`, for steps `U`. This is subtracted
 //! from `H`; in `M` it stays, since an estimate by these slopes is subject to it
 //! ([`LocalFit::told`]). Identification by emulation omits this correction: it takes the fitted
-//! slopes at face value and widens every direction by its inflation ([`narrowing`]). The
+//! slopes at face value and widens every direction by its inflation ([`informed`]). The
 //! information that an episode is expected to give it is computed the same way
 //! ([`LocalFit::emulated`]), so that both agree.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::fisher::precision::{Precision, implied, inflation, narrowing};
+use crate::fisher::precision::{Precision, implied, inflation, informed};
 use crate::fisher::symmetric_eigen;
 use asid_core::rng::Rng;
 
@@ -255,9 +255,8 @@ impl LocalFit {
             lower = implied(&precision, &columns)?;
             inflated = inflation(&precision, &columns, &self.luck, self.freedom, &lower)?;
         }
-        let (narrowing, _) = narrowing(&lower, &inflated)?;
         let curvature = precision.weigh(&self.slopes) * columns;
-        self.outside(&(narrowing.transpose() * curvature * narrowing))
+        self.outside(&informed(&curvature, &lower, &inflated)?)
     }
 
     /// Variance of the roughness at each reading.

@@ -97,27 +97,35 @@ pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> 
     Some((h + DMatrix::identity(n, n) * ridge).cholesky()?.l())
 }
 
-/// Transformation `N` that gives a loss with curvature `H` the width of the sandwich formula.
+/// Divisor of a loss with curvature `H = L L^T` that gives it the width of the sandwich formula.
 ///
-/// The loss at `best + N (u - best)` has the covariance `N^-1 H^-1 N^-T = H^-1 M H^-1` at `best`
-/// (curvature adjustment: Ribatet, Cooley and Davison 2012). Each direction is widened by what
-/// *its* readings scatter, so that an unknown that smooth readings determine keeps its narrow
-/// interval beside one that rough readings determine. No direction becomes narrower than the
-/// weights imply.
-///
-/// `lower` is the factor of `H`, of [`implied`], and `inflation` the matrix of [`inflation`].
-/// Returned with it is the largest inflation of a direction, at least 1.
+/// In the coordinates of [`inflation`], direction `i` is wider than `H` implies by a ratio `v_i`, at
+/// least 1. Returned are the largest ratio `v` and the matrix with the eigenvalues `1 / v_i - 1 / v`.
+/// The loss over `v`, and half the square of `L^-1 B^T P e` in this matrix, have together the
+/// curvature `L diag(1 / v_i) L^T`. Each direction is widened by what *its* readings scatter, so that
+/// an unknown that smooth readings determine keeps its narrow interval beside one that rough readings
+/// determine (curvature adjustment: Ribatet, Cooley and Davison 2012).
 #[must_use]
-pub fn narrowing(lower: &DMatrix<f64>, inflation: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+pub fn tempered(inflation: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
     let eigen = symmetric_eigen((inflation + inflation.transpose()) * 0.5)?;
+    let ratios = eigen.eigenvalues.map(|v| v.max(1.0));
+    let most = ratios.max();
+    let further = DMatrix::from_diagonal(&ratios.map(|v| 1.0 / v - 1.0 / most));
     let axes = eigen.eigenvectors;
-    let upper = lower.transpose();
-    let mut narrowed = upper.solve_upper_triangular(&axes)?;
-    for (mut column, v) in narrowed.column_iter_mut().zip(&eigen.eigenvalues) {
-        column /= v.max(1.0).sqrt();
-    }
-    let most = eigen.eigenvalues.iter().copied().fold(1.0, f64::max);
-    Some((narrowed * axes.transpose() * upper, most))
+    Some((most, &axes * further * axes.transpose()))
+}
+
+/// Information of the sandwich formula, as [`tempered`] divides the curvature `h`.
+///
+/// `lower` is the factor of `h`, of [`implied`], which adds a ridge.
+#[must_use]
+pub fn informed(
+    h: &DMatrix<f64>,
+    lower: &DMatrix<f64>,
+    inflation: &DMatrix<f64>,
+) -> Option<DMatrix<f64>> {
+    let (most, further) = tempered(inflation)?;
+    Some(h / most + lower * further * lower.transpose())
 }
 
 fn scale_columns(x: &mut DMatrix<f64>, by: &DVector<f64>) {
@@ -146,21 +154,21 @@ mod tests {
     }
 
     #[test]
-    fn the_narrowed_loss_has_the_covariance_of_the_sandwich() {
+    fn the_tempered_loss_has_the_covariance_of_the_sandwich() {
         // Two entries, one shared shift of the last three readings, all inflations above 1.
         let b = DMatrix::from_row_slice(4, 2, &[1.0, 0.2, 0.5, 0.0, 0.0, 1.0, 0.3, 2.0]);
         let epsilon = DMatrix::from_row_slice(2, 4, &[2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0]);
         let precision = Precision::diagonal(&DVector::from_vec(vec![0.5, 1.0, 1.0, 1.0]));
         let lower = implied(&precision, &b).unwrap();
         let inflated = inflation(&precision, &b, &epsilon, 1.0, &lower).unwrap();
-        let (back, _) = narrowing(&lower, &inflated).unwrap();
         let p = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0 / 1.5, 0.5, 0.5, 0.5]));
         let h = b.transpose() * &p * &b;
+        let information = informed(&h, &lower, &inflated).unwrap();
         let covariance = DMatrix::identity(4, 4) + epsilon.transpose() * &epsilon;
         let m = b.transpose() * &p * covariance * &p * &b;
         let bread = h.clone().try_inverse().unwrap();
         let sandwich = &bread * m * &bread;
-        let adjusted = (back.transpose() * h * back).try_inverse().unwrap();
+        let adjusted = information.try_inverse().unwrap();
         assert!(
             (&adjusted - &sandwich).norm() < 1e-6 * sandwich.norm(),
             "{adjusted} {sandwich}"
@@ -178,12 +186,19 @@ mod tests {
         let precision = Precision::diagonal(&DVector::repeat(m, 0.0));
         let lower = implied(&precision, &b).unwrap();
         let inflated = inflation(&precision, &b, &epsilon, 8.0, &lower).unwrap();
-        let (back, _) = narrowing(&lower, &inflated).unwrap();
-        let apart = DVector::from_vec(vec![1.0, -1.0]);
-        assert!((&back * &apart - &apart).norm() < 1e-3, "{back}");
+        let h = &lower * lower.transpose();
+        let information = informed(&h, &lower, &inflated).unwrap();
+        let along = |g: &DMatrix<f64>, by: [f64; 2]| {
+            let by = DVector::from_column_slice(&by);
+            by.dot(&(g * &by))
+        };
+        // Where the curvature is that of the ridge, the inflation is below 1.
+        let apart = [1.0, -1.0];
+        let ratio = along(&information, apart) / along(&h, apart);
+        assert!((ratio - 1.0).abs() < 1e-2, "{ratio}");
         // M / H = 1 + |b|^2 along the sum.
         let ratio = 1.0 + b.column(0).norm_squared();
-        let sum = (&back * DVector::from_vec(vec![0.5, 0.5])).sum();
-        assert!((sum * ratio.sqrt() - 1.0).abs() < 1e-3, "{sum} {ratio}");
+        let sum = along(&information, [0.5; 2]) / along(&h, [0.5; 2]);
+        assert!((sum * ratio - 1.0).abs() < 1e-2, "{sum} {ratio}");
     }
 }

@@ -16,14 +16,17 @@
 //! `H^-1 B^T W (1 + R) W B H^-1`, `H = B^T W B`, `B = de/dx`, `R = cov(epsilon)`
 //!
 //! The loss is divided by the largest ratio of the sandwich to the naive covariance along any
-//! direction (a temperature), which keeps its shape. Along other directions the sandwich knows more
-//! than that ([`narrowing`]). What it knows more is added as a normal density about the minimum, so
-//! that an unknown that smooth readings determine keeps its narrow interval beside one that rough
-//! readings determine. Where the emulator does not explain the observation within noise and
-//! roughness, all is divided by the mismatch. Points are never selected by how well they fit, which
-//! would bias the result.
+//! direction (a temperature). Along other directions the sandwich knows more than that. With
+//! `H = L L^T`, `w = L^-1 B^T W e` are the parts of the weighed residual that the unknowns move, and
+//! the sandwich is their covariance. So each is divided by its own ratio ([`tempered`]): an unknown
+//! that smooth readings determine keeps its narrow interval beside one that rough readings
+//! determine. This is a function of the residual alone. Where the readings show only a product of
+//! two unknowns, it is therefore constant along the curved valley, as the loss is.
+//!
+//! Where the emulator does not explain the observation within noise and roughness, all is divided
+//! by the mismatch. Points are never selected by how well they fit, which would bias the result.
 
-use crate::fisher::precision::{Precision, implied, inflation, narrowing};
+use crate::fisher::precision::{Precision, implied, inflation, tempered};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 
@@ -44,11 +47,8 @@ pub struct Emulator {
     gram: DMatrix<f64>,
     /// Best point within reach, standardised.
     best: DVector<f64>,
-    /// Information of the sandwich beyond that of the tempered loss, and the point that it is about.
-    further: DMatrix<f64>,
-    middle: DVector<f64>,
-    /// Factor on the loss: the inverse of the largest inflation times the mismatch.
-    temperature: f64,
+    /// The same, as wide as the sandwich.
+    widened: DMatrix<f64>,
     /// Root mean square of the emulated whitened residual at its best point.
     pub residual: f64,
     /// Root mean square of the roughness, in units of the sensors' noise.
@@ -91,6 +91,12 @@ fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
     slope
 }
 
+/// `phi^T G phi / 2` at a standardised point.
+fn half_square(g: &DMatrix<f64>, u: &[f64]) -> f64 {
+    let phi = DVector::from_vec(features(u));
+    0.5 * phi.dot(&(g * &phi))
+}
+
 impl Emulator {
     /// Fits the residuals of points in a region; `None` where there are too few points.
     ///
@@ -131,11 +137,9 @@ impl Emulator {
         let gram = precision.weigh(&a) * a.transpose();
         let mut emulator = Self {
             region: region.clone(),
+            widened: gram.clone(),
             gram,
             best: DVector::zeros(n),
-            further: DMatrix::zeros(n, n),
-            middle: DVector::zeros(n),
-            temperature: 1.0,
             residual: 0.0,
             roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
             misfit: 0.0,
@@ -174,38 +178,23 @@ impl Emulator {
         } else {
             inflation(&precision, &b, &epsilon, freedom, &lower)?
         };
-        let (narrowing, most) = narrowing(&lower, &inflated)?;
-        let h = &lower * lower.transpose();
-        let misfit = mismatch.max(1.0);
-        emulator.temperature = 1.0 / (most * misfit);
-        emulator.further = (narrowing.tr_mul(&(&h * &narrowing)) - h / most) / misfit;
-        // A minimum beyond reach leaves a slope at the best point; a Newton step leads to it.
-        let uphill = &emulator.gram * &best_features;
-        let mut step = DVector::from_fn(n, |k, _| {
-            DVector::from_vec(feature_slope(&best, k)).dot(&uphill)
-        });
-        lower.solve_lower_triangular_mut(&mut step);
-        lower.tr_solve_lower_triangular_mut(&mut step);
+        let (most, further) = tempered(&inflated)?;
+        let moved = precision.weigh(&b.transpose()) * a.transpose();
+        let moved = lower.solve_lower_triangular(&moved)?;
+        let widened = &emulator.gram / most + moved.tr_mul(&(further * &moved));
+        emulator.widened = widened / mismatch.max(1.0);
         emulator.best = DVector::from_vec(best);
-        emulator.middle = &emulator.best - step;
         Some(emulator)
     }
 
     fn loss_at(&self, u: &[f64]) -> f64 {
-        let phi = DVector::from_vec(features(u));
-        0.5 * phi.dot(&(&self.gram * &phi))
+        half_square(&self.gram, u)
     }
 
-    /// Loss at a point of the search space, as wide as the sandwich and tempered.
+    /// Loss at a point of the search space, as wide as the sandwich.
     #[must_use]
     pub fn loss(&self, x: &[f64]) -> f64 {
-        self.widened(&self.region.standardise(x))
-    }
-
-    /// [`loss`](Self::loss) at a standardised point.
-    fn widened(&self, u: &[f64]) -> f64 {
-        let off = DVector::from_column_slice(u) - &self.middle;
-        self.temperature * self.loss_at(u) + 0.5 * off.dot(&(&self.further * &off))
+        half_square(&self.widened, &self.region.standardise(x))
     }
 
     /// The best point within reach, in standardised coordinates, by damped Newton steps.
@@ -277,9 +266,8 @@ impl Emulator {
         let slopes: Vec<DVector<f64>> = (0..n)
             .map(|k| DVector::from_vec(feature_slope(&u, k)))
             .collect();
-        let h = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.gram * &slopes[j])));
-        let curvature =
-            h * self.temperature + &self.further + DMatrix::identity(n, n) * REACH.powi(-2);
+        let h = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.widened * &slopes[j])));
+        let curvature = h + DMatrix::identity(n, n) * REACH.powi(-2);
         let Some(factor) = curvature
             .cholesky()
             .map(|c| c.inverse())
@@ -290,7 +278,7 @@ impl Emulator {
         let walk = Walk {
             shape: factor.l(),
             inside: &inside,
-            loss: &|u: &[f64]| self.widened(u),
+            loss: &|u: &[f64]| half_square(&self.widened, u),
         };
         let drawn = walk.draws(&u, count, rng);
         drawn.iter().map(|u| self.region.unstandardise(u)).collect()
@@ -451,6 +439,44 @@ mod tests {
         assert!((std(0) / 0.2 - 1.0).abs() < 0.3, "{}", std(0));
         // Slopes and roughness come from 64 points.
         assert!((std(1) / 1.2 - 1.0).abs() < 0.35, "{}", std(1));
+    }
+
+    /// The readings show two unknowns only through their product, smoothly, and a third one with a
+    /// shift that moves all its readings.
+    ///
+    /// Along the valley of the product nothing is known, so the first unknown spreads over the box.
+    /// A normal density about the minimum would hold it near the valley's tangent.
+    #[test]
+    fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
+        let (m, slope, rough) = (200, 0.5, 3.0);
+        let region = Gaussian::diagonal(&[0.0; 3], &[1.0; 3], &[-9.0; 3], &[9.0; 3]);
+        let mut rng = Streams::new(5).stream("e");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut draws = Streams::new(5).stream("d");
+        let points: Vec<Vec<f64>> = (0..96).map(|_| region.sample(&mut draws)).collect();
+        let product = |x: &[f64]| (2.0 + x[0]) * (2.0 + x[1]) - 4.0;
+        let residuals: Vec<Vec<f64>> = points
+            .iter()
+            .map(|x| {
+                let luck = rough * normal();
+                let half = |k: usize| k < m / 2;
+                let simulated = |k| if half(k) { product(x) } else { x[2] + luck };
+                (0..m).map(|k| slope * simulated(k)).collect()
+            })
+            .collect();
+        let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+        // Of the product, 100 readings of slope 0.5 tell 0.2.
+        let off = |x: [f64; 3]| emulator.loss(&x) - emulator.loss(&[0.0; 3]);
+        let across = off([0.1, 0.1, 0.0]);
+        let wanted = 0.5 * (0.41_f64 / 0.2).powi(2);
+        assert!((across / wanted - 1.0).abs() < 0.1, "{across} {wanted}");
+        // Both points have the product of the middle.
+        for x in [-1.0, 1.5] {
+            let along = off([x, 4.0 / (2.0 + x) - 2.0, 0.0]);
+            assert!(along.abs() < 0.2, "{x}: {along}");
+        }
     }
 
     /// A linear simulator whose minimum lies 5 standard deviations of the region from its middle.

@@ -3,7 +3,7 @@
 //! `f` maps the state at one row of the log to the state at the next, under the row's command. `h`
 //! is the sensors' readings of a state. Both come from a batch of any engine. A pass walks all
 //! episodes side by side: at each row it sets every simulation to the trajectory's state and steps
-//! it to the next row.
+//! it to the next row. Segments are set at their first row alone, and replayed from there.
 //!
 //! Derivatives are forward differences. Each episode has one simulation for the unperturbed model
 //! and one for each perturbed coordinate of the state, force or value. An effect with memory (a
@@ -13,6 +13,7 @@
 mod along;
 mod carried;
 mod late;
+mod leg;
 mod linear_episode;
 mod pass;
 mod reading;
@@ -21,7 +22,6 @@ mod roll;
 mod sensors;
 mod shares;
 mod step;
-mod stretch;
 
 use asid_core::layout::{Layout, Recording};
 use asid_core::{BatchConfig, Model as _, Parameter, Result, Simulator as _};
@@ -414,8 +414,8 @@ impl<'a> StepMap<'a> {
     ///
     /// Returns, for each walk, the sum of squared residuals of the readings that count, each
     /// divided by its `variance` (one per entry); 0 for other walks. `most` holds one limit per
-    /// walk, or `None` if it is not replayed. A replay ends once its sum exceeds the limit; the sum
-    /// is then infinite, as where the engine fails.
+    /// walk, or `None` if it is not replayed. A replay ends some rows after its sum exceeds the
+    /// limit; the sum is then infinite, as where the engine fails.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].

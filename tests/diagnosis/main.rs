@@ -33,6 +33,7 @@ mod roll;
 mod row_slopes;
 mod rows;
 mod scatter;
+mod segment_slopes;
 mod seldom;
 mod series_spring;
 mod servo;

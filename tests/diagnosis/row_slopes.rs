@@ -196,7 +196,9 @@ fn what_acts_on_readings_alone_is_read_and_not_stepped() {
         let found = map
             .linearise(&[0.0], &[states()], want, &[], &varied)
             .unwrap();
-        assert_eq!(map.steps(), ((ROWS - 1) * STEPS) as u64);
+        // A segment is replayed once more for its residuals.
+        let replays = if segment.is_some() { 2 } else { 1 };
+        assert_eq!(map.steps(), (replays * (ROWS - 1) * STEPS) as u64);
         assert!(largest_difference(&found[0].reading_columns, &[1.0; ROWS]) < 1e-12);
         assert!(found[0].state_columns.iter().all(|x| *x == 0.0));
     }

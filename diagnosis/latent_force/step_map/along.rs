@@ -5,10 +5,10 @@ use asid_core::{Result, Simulator as _};
 use crate::latent_force::tangent::difference;
 use crate::latent_force::walk::Walk;
 
+use super::leg::legs;
 use super::pass::Part;
 use super::role::Role;
 use super::step::RowBuffers;
-use super::stretch::stretches;
 use super::{Common, LinearEpisode, Request};
 
 /// Most rows in one rollout.
@@ -17,9 +17,10 @@ use super::{Common, LinearEpisode, Request};
 const ROWS: usize = 64;
 
 impl Part {
-    /// Replays some of its segments, unperturbed and in some roles, and takes the differences of
-    /// the readings at all rows.
-    pub(super) fn along(
+    /// Replays some of its segments, unperturbed and in some roles.
+    ///
+    /// Takes the defects, the residuals, and the differences of the readings at all rows.
+    pub(super) fn replay_stepped(
         &mut self,
         c: &Common<'_>,
         request: Request<'_>,
@@ -43,18 +44,18 @@ impl Part {
         let width = c.states_and_readings.width();
         let (mut reached, mut rolled) = (vec![0; n], Vec::new());
         loop {
-            let next = stretches(&walks, (&here, &reached), ROWS);
+            let next = legs(&walks, (&here, &reached), ROWS);
             if next.is_empty() {
                 return Ok(());
             }
-            for stretch in next {
-                self.roll_on(c, (&stretch, roles.len()), &mut rolled)?;
-                for (i, &e) in stretch.walks.iter().enumerate() {
-                    reached[e] += stretch.rows;
-                    for f in 0..stretch.rows {
-                        let at = |v: usize| (v * stretch.walks.len() + i) * stretch.rows + f;
+            for leg in next {
+                self.roll_on(c, (&leg, roles.len()), &mut rolled)?;
+                for (i, &e) in leg.walks.iter().enumerate() {
+                    reached[e] += leg.rows;
+                    for f in 0..leg.rows {
+                        let at = |v: usize| (v * leg.walks.len() + i) * leg.rows + f;
                         let row = |v: usize| &rolled[at(v) * width..(at(v) + 1) * width];
-                        let k = stretch.from + f;
+                        let k = leg.from + f;
                         let ahead = &request.trajectory[self.walks[e]][(k + 1) * state..];
                         let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
                         difference(&c.layout, &row(0)[..state], &ahead[..state], defect);

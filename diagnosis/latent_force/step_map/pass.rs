@@ -1,8 +1,9 @@
 //! One pass along the rows: every simulation is set to the trajectory at each row, read, and
 //! stepped to the next.
 //!
-//! Segments run on from their first row ([`super::along`]). They take a pass only for values of
-//! effects on readings: those simulations follow the unperturbed one and are only read.
+//! Segments are replayed from their first row ([`super::along`]). They take a pass only where
+//! derivatives with respect to forces are wanted, and for values of effects on readings: those
+//! simulations follow the unperturbed one and are only read.
 
 use std::collections::BTreeMap;
 
@@ -50,13 +51,9 @@ impl Part {
         } = request;
         let nv = c.layout.nv;
         let nx = 2 * nv;
-        let only_replays = self.walks.iter().all(|&w| c.rolls(w, want));
         let mut in_state = Vec::new();
         if want.state {
-            in_state = Role::in_state(
-                (c.islands.slots(), nv),
-                c.remembers_readings && !only_replays,
-            );
+            in_state = Role::in_state((c.islands.slots(), nv), c.remembers_readings);
         }
         let others = Role::others(c.islands.slots(), want, variations.len());
         let (ns, m) = (c.logs.entries.len(), variations.len());
@@ -74,6 +71,7 @@ impl Part {
             let wanted = |role: &Role| match role {
                 Role::Varied(i) => request.wants(*i, class.columns),
                 Role::State(i) => class.state && !class.blind.get(*i).is_some_and(|blind| *blind),
+                Role::Reading(_) | Role::Ramp(_) => !class.replayed,
                 _ => true,
             };
             let states = in_state.iter().filter(|_| class.state);
@@ -110,10 +108,8 @@ impl Part {
         for chunk in read.chunks(c.capacity - 1) {
             self.pass(c, request, (chunk, which), out, ramps)?;
         }
-        if read.is_empty() || !stepped.is_empty() {
-            for chunk in chunks(&stepped, c.capacity - 1) {
-                self.along(c, request, (chunk, which), out)?;
-            }
+        for chunk in chunks(&stepped, c.capacity - 1) {
+            self.replay_stepped(c, request, (chunk, which), out)?;
         }
         Ok(())
     }
@@ -153,10 +149,11 @@ impl Part {
         let (roles, some) = self.begin(c, request, (extra, which), &mut row)?;
         let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
         let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
+        let replayed = some.iter().any(|&e| c.rolls(self.walks[e], request.want));
         for k in 0..longest {
             let reach = |e: &usize| walks[*e].len() > k;
             let here: Vec<usize> = some.iter().copied().filter(reach).collect();
-            if k > 0 {
+            if k > 0 && !replayed {
                 self.place(c, &roles, (&here, k), request, &mut row)?;
             }
             self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
@@ -208,8 +205,7 @@ impl Part {
         Ok((roles, some))
     }
 
-    /// Places all simulations of some episodes at row `k`; those of segments only at the first row,
-    /// as they run on by themselves.
+    /// Places all simulations of some episodes at row `k`.
     fn place(
         &mut self,
         c: &Common<'_>,
@@ -219,12 +215,6 @@ impl Part {
         row: &mut RowBuffers,
     ) -> Result<()> {
         let (n, nq, nv) = (self.walks.len(), c.layout.nq, c.layout.nv);
-        let placed: Vec<usize> = here
-            .iter()
-            .copied()
-            .filter(|&e| k == 0 || !c.rolls(self.walks[e], request.want))
-            .collect();
-        let here = &placed[..];
         if c.depends_on_past && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {

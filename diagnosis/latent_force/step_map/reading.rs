@@ -8,20 +8,11 @@ use super::step::RowBuffers;
 use super::{Common, LinearEpisode, Request};
 
 impl Part {
-    /// Returns the places of the roles that are read at row `k`; all of them where some walks run
-    /// on by themselves.
+    /// Returns the places of the roles that are read at row `k`.
     ///
     /// A derivative with respect to a force concerns the next state alone.
-    fn read_at(
-        &self,
-        c: &Common<'_>,
-        roles: &[Role],
-        (here, k): (&[usize], usize),
-        request: Request<'_>,
-    ) -> Vec<usize> {
-        let rolls = here.iter().any(|&e| c.rolls(self.walks[e], request.want));
+    fn read_at(c: &Common<'_>, roles: &[Role], k: usize, request: Request<'_>) -> Vec<usize> {
         let is_read = |&v: &usize| match roles[v] {
-            _ if rolls => true,
             Role::Nominal | Role::Reading(_) | Role::Ramp(_) => true,
             Role::Force(_) | Role::Jolt(_) => false,
             Role::State(_) => k == 0 || !c.sensors.read_the_state || c.sensors.change,
@@ -42,7 +33,7 @@ impl Part {
     ) -> Result<()> {
         let variations = request.variations;
         let (n, ns, nx) = (self.walks.len(), c.logs.entries.len(), 2 * c.layout.nv);
-        let read = self.read_at(c, roles, (here, k), request);
+        let read = Self::read_at(c, roles, k, request);
         row.sims.clear();
         for v in &read {
             row.sims.extend(here.iter().map(|e| v * n + e));

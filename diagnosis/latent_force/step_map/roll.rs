@@ -5,10 +5,10 @@ use asid_core::{Result, Simulator as _};
 use crate::latent_force::walk::Walk;
 
 use super::Common;
+use super::leg::legs;
 use super::pass::Part;
-use super::stretch::stretches;
 
-/// Most rows in one rollout: a replay that is no use ends after them.
+/// Most rows in one rollout. A replay beyond its limit is noticed only after them.
 const ROWS: usize = 16;
 
 impl Part {
@@ -83,15 +83,15 @@ impl Part {
         let (mut reached, mut rolled) = (vec![0; walks.len()], Vec::new());
         loop {
             going.retain(|&e| left[e].is_finite());
-            let next = stretches(&walks, (&going, &reached), ROWS);
+            let next = legs(&walks, (&going, &reached), ROWS);
             if next.is_empty() {
                 return Ok(left);
             }
-            for stretch in next {
-                self.roll_on(c, (&stretch, 1), &mut rolled)?;
+            for leg in next {
+                self.roll_on(c, (&leg, 1), &mut rolled)?;
                 let rows = rolled.chunks_exact(c.states_and_readings.width());
                 for (i, row) in rows.enumerate() {
-                    let e = stretch.walks[i / stretch.rows];
+                    let e = leg.walks[i / leg.rows];
                     let (state, read) = row.split_at(width);
                     if !left[e].is_finite() {
                         continue;

@@ -68,11 +68,11 @@ impl Part {
             k,
             substeps,
         } = stepped;
-        let rolls = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
+        let replayed = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
         let (read, all): (Vec<usize>, Vec<usize>) =
             (0..roles.len()).partition(|&v| request.is_read_alone(roles[v]));
         let (mut short, mut whole) = (Vec::new(), all.clone());
-        if c.one_step && !rolls && substeps >= MANY {
+        if c.one_step && substeps >= MANY {
             (short, whole) = self.told_by_one_step(c, stepped, request, out);
         }
         let mut done = 0;
@@ -87,7 +87,7 @@ impl Part {
         self.advance(c, (stepped, &whole), done..substeps, request, row)?;
         for v in read {
             let sims: Vec<usize> = now.iter().map(|e| v * self.walks.len() + e).collect();
-            if rolls {
+            if replayed {
                 self.simulator.follow(now, &sims)?;
             } else {
                 self.simulator.pass_time(&sims, substeps as u64);
@@ -101,9 +101,6 @@ impl Part {
             let ahead = &request.trajectory[self.walks[e]][(k + 1) * width..(k + 2) * width];
             let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
             difference(&c.layout, nominal, ahead, defect);
-            if c.rolls(self.walks[e], request.want) {
-                continue;
-            }
             for (place, &v) in whole.iter().enumerate().skip(1) {
                 let other = row.state(place * now.len() + i, width);
                 difference(&c.layout, other, nominal, &mut differ);

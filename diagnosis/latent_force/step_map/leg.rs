@@ -1,7 +1,8 @@
 //! Rollouts of several rows at once along segments, which run on by themselves.
 //!
-//! Between two rollouts an engine copies every state, and reading a row costs half a physics step.
-//! Within one rollout nothing is copied, and that half is the first half of the next step.
+//! Between two rollouts an engine copies every state. In MuJoCo reading a row costs half a physics
+//! step, which within a rollout is the first half of the next one (not with Runge-Kutta, nor where
+//! an effect changes the model in each step).
 
 use std::collections::BTreeMap;
 
@@ -14,10 +15,10 @@ use super::pass::Part;
 
 /// Rows that some walks are rolled out by, all with the same physics steps.
 #[derive(Debug, PartialEq)]
-pub(super) struct Stretch {
+pub(super) struct Leg {
     /// Row that the walks have reached.
     pub(super) from: usize,
-    /// Rows from there to the last one.
+    /// Number of rows after it.
     pub(super) rows: usize,
     /// Physics steps of each row.
     substeps: usize,
@@ -27,11 +28,11 @@ pub(super) struct Stretch {
 
 /// Groups the walks of `going` that have not ended, where each has reached row `reached`, by the
 /// next rows they take together: at most `most`.
-pub(super) fn stretches(
+pub(super) fn legs(
     walks: &[&Walk],
     (going, reached): (&[usize], &[usize]),
     most: usize,
-) -> Vec<Stretch> {
+) -> Vec<Leg> {
     let mut groups: BTreeMap<(usize, usize, usize), Vec<usize>> = BTreeMap::new();
     for &e in going {
         let from = reached[e];
@@ -42,31 +43,31 @@ pub(super) fn stretches(
             group.or_default().push(e);
         }
     }
-    let stretch = |((from, rows, substeps), walks)| Stretch {
+    let leg = |((from, rows, substeps), walks)| Leg {
         from,
         rows,
         substeps,
         walks,
     };
-    groups.into_iter().map(stretch).collect()
+    groups.into_iter().map(leg).collect()
 }
 
 impl Part {
-    /// Rolls out the first `roles` simulations of each walk of a stretch.
+    /// Rolls out the first `roles` simulations of each walk of a leg.
     ///
-    /// Writes the states and readings of each row but the first, `roles x walks x rows`, in the
+    /// Writes the states and readings of the rows after `from`, `roles x walks x rows`, in the
     /// order of [`Common::states_and_readings`].
     pub(super) fn roll_on(
         &mut self,
         c: &Common<'_>,
-        (stretch, roles): (&Stretch, usize),
+        (leg, roles): (&Leg, usize),
         out: &mut Vec<f64>,
     ) -> Result<()> {
-        let Stretch { from, rows, .. } = *stretch;
+        let Leg { from, rows, .. } = *leg;
         let (n, nu) = (self.walks.len(), c.layout.nu());
         let (mut sims, mut ctrl) = (Vec::new(), Vec::new());
         for v in 0..roles {
-            for &e in &stretch.walks {
+            for &e in &leg.walks {
                 sims.push(v * n + e);
                 let walk = &c.walks[self.walks[e]];
                 ctrl.extend_from_slice(&walk.ctrl[from * nu..(from + rows) * nu]);
@@ -74,7 +75,7 @@ impl Part {
         }
         let record = &c.states_and_readings;
         let control = Control::PerSimulation(&ctrl);
-        let rollout = Rollout::new(&sims, rows, stretch.substeps, control, record);
+        let rollout = Rollout::new(&sims, rows, leg.substeps, control, record);
         out.resize(sims.len() * rows * record.width(), 0.0);
         self.simulator.rollout(&rollout, out)
     }
@@ -100,7 +101,7 @@ mod tests {
         let walks = [walk(&[5; 9]), walk(&[5, 5, 4]), walk(&[5; 9]), walk(&[])];
         let walks: Vec<&Walk> = walks.iter().collect();
         let next = |going: &[usize], reached: [usize; 4]| {
-            let found = stretches(&walks, (going, &reached), 8);
+            let found = legs(&walks, (going, &reached), 8);
             let each = found.into_iter();
             each.map(|s| (s.from, s.rows, s.substeps, s.walks))
                 .collect::<Vec<_>>()
