@@ -12,18 +12,20 @@
 
 mod along;
 mod carried;
+mod common;
 mod late;
 mod leg;
 mod linear_episode;
 mod pass;
 mod reading;
+mod request;
 mod role;
 mod roll;
 mod sensors;
 mod shares;
 mod step;
 
-use asid_core::layout::{Layout, Recording};
+use asid_core::layout::Layout;
 use asid_core::{BatchConfig, Model as _, Parameter, Result, Simulator as _};
 use asid_effects::{Acts, EffectSpec};
 use rayon::prelude::*;
@@ -35,10 +37,12 @@ use crate::machine::Machine;
 use super::islands::Islands;
 use super::walk::Walk;
 
+use common::Common;
 pub use late::retime_columns;
 pub use linear_episode::{Derivatives, LinearEpisode, Variation};
 use pass::Part;
-use role::Role;
+pub use request::Anew;
+use request::Request;
 use sensors::Sensors;
 use shares::share_out;
 
@@ -49,149 +53,6 @@ const MOST_SIMULATIONS: usize = 1024;
 pub struct StepMap<'a> {
     common: Common<'a>,
     parts: Vec<Part>,
-}
-
-/// What all parts share.
-struct Common<'a> {
-    logs: &'a Logs,
-    walks: &'a [Walk],
-    layout: Layout,
-    columns: BatchColumns,
-    states: Recording,
-    readings: Recording,
-    /// Both in one row: first the state.
-    states_and_readings: Recording,
-    /// Largest number of roles in one pass.
-    capacity: usize,
-    /// Whether a step may depend on time or on earlier states: by an effect on commands, forces or
-    /// readings, or by what the model's own actuators remember.
-    depends_on_past: bool,
-    /// Whether an effect makes readings depend on earlier ones.
-    remembers_readings: bool,
-    /// Whether an effect changes what sensors read.
-    alters_readings: bool,
-    /// Whether one physics step gives a row's derivatives with respect to the state.
-    one_step: bool,
-    /// Uncoupled degrees of freedom, which one simulation perturbs together.
-    islands: Islands,
-    /// Whether each parameter acts in every physics step alike, as a property of the model does.
-    at_once: Vec<bool>,
-    /// Whether each parameter belongs to an effect on readings.
-    measured: Vec<bool>,
-    /// What the readings depend on.
-    sensors: Sensors,
-}
-
-impl Common<'_> {
-    /// Returns the number of the episode that a walk belongs to.
-    fn episode(&self, walk: usize) -> usize {
-        self.logs.episodes[self.walks[walk].episode].number
-    }
-
-    /// Whether a walk is replayed from its first row, with the derivatives of the whole replay.
-    ///
-    /// True for a segment, unless derivatives with respect to forces are wanted: those are
-    /// derivatives over single rows.
-    fn rolls(&self, walk: usize, want: Derivatives) -> bool {
-        self.walks[walk].segment.is_some() && !want.force
-    }
-
-    /// Writes what the log reads at row `k` of a walk less a reading of the model; NaN where it
-    /// does not count.
-    fn residual(&self, (walk, k): (&Walk, usize), read: &[f64], out: &mut [f64]) {
-        let readings = &self.logs.episodes[walk.episode].readings;
-        let logged = &readings[walk.rows[k] * read.len()..(walk.rows[k] + 1) * read.len()];
-        self.logs.reading_difference(logged, read, out);
-        if walk.segment.is_some_and(|lead| k < lead) {
-            out.fill(f64::NAN);
-        }
-    }
-
-    /// Whether a variation changes only parameters that act in every physics step alike.
-    ///
-    /// False where sensors have memory, since their readings depend on other steps too.
-    fn acts_at_once(&self, theta: &[f64], variation: &Variation) -> bool {
-        let values = theta.iter().zip(&variation.theta).zip(&self.at_once);
-        let mut varied = values.filter(|((a, b), _)| a != b);
-        !self.remembers_readings && varied.all(|(_, at_once)| *at_once)
-    }
-
-    /// Whether a variation changes effects on readings alone.
-    ///
-    /// Its motion is that of the unperturbed model, so it is only read.
-    fn is_read_alone(&self, theta: &[f64], variation: &Variation) -> bool {
-        let values = theta.iter().zip(&variation.theta).zip(&self.measured);
-        values
-            .filter(|((a, b), _)| a != b)
-            .all(|(_, measured)| *measured)
-    }
-
-    /// Whether a variation changes the readings of an unchanged state.
-    fn is_read(&self, theta: &[f64], variation: &Variation) -> bool {
-        let values = theta.iter().zip(&variation.theta);
-        let mut of_values = values.zip(&self.sensors.of_readings);
-        !self.sensors.read_the_state
-            || of_values.any(|((a, b), of_readings)| *of_readings && a != b)
-    }
-}
-
-/// Which parts of a linearisation are computed anew: all by default. Other parts are zero.
-#[derive(Clone, Copy, Default)]
-pub struct Anew<'r> {
-    /// Walks whose derivatives with respect to the state are computed; empty for all.
-    pub state: &'r [bool],
-    /// [`LinearEpisode::carried`] of the other walks; empty for none.
-    pub carried: &'r [Vec<f64>],
-    /// Variations whose columns are kept, except along the walks of `columns`; empty for none.
-    pub kept: &'r [bool],
-    /// Walks along which the columns of all variations are computed; empty for none.
-    pub columns: &'r [bool],
-    /// For each segment: coordinates of its initial state on which its readings do not depend.
-    /// Their derivatives are zero. Empty for none.
-    pub blind: &'r [Vec<bool>],
-}
-
-/// The linearisation point and what is wanted there.
-#[derive(Clone, Copy)]
-struct Request<'r> {
-    theta: &'r [f64],
-    trajectory: &'r [Vec<f64>],
-    want: Derivatives,
-    push: &'r [f64],
-    variations: &'r [Variation],
-    anew: Anew<'r>,
-    /// Whether each variation changes only what acts in every physics step alike.
-    at_once: &'r [bool],
-    /// Whether each variation changes the readings of an unchanged state.
-    read: &'r [bool],
-    /// Whether each variation changes readings alone.
-    alone: &'r [bool],
-}
-
-impl<'r> Request<'r> {
-    /// Whether derivatives with respect to the state are computed for a walk, if any are wanted.
-    fn due(&self, walk: usize) -> bool {
-        self.anew.state.get(walk).is_none_or(|due| *due)
-    }
-
-    /// Coordinates of a walk's initial state whose derivatives are zero; empty for none.
-    fn blind(&self, walk: usize) -> &'r [bool] {
-        self.anew.blind.get(walk).map_or(&[], Vec::as_slice)
-    }
-
-    /// Whether a role is read at each row and never stepped.
-    fn is_read_alone(&self, role: Role) -> bool {
-        match role {
-            Role::Varied(i) => self.alone[i],
-            _ => role.is_read_alone(),
-        }
-    }
-
-    /// Whether the column of a variation is wanted along the walks whose columns are `due`, or else
-    /// along the other walks.
-    fn wants(&self, variation: usize, due: bool) -> bool {
-        due || !self.anew.kept.get(variation).is_some_and(|kept| *kept)
-    }
 }
 
 impl<'a> StepMap<'a> {

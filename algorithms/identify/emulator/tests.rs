@@ -1,0 +1,239 @@
+use super::*;
+use asid_core::Streams;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Fits one draw of noise from a linear simulator with 200 readings; returns the estimate and
+/// its standard deviation.
+///
+/// Roughness has size `rough` and lasts `run` readings.
+fn fitted(seed: u64, rough: f64, run: usize, correlated: bool) -> (f64, f64) {
+    let mut rng = Streams::new(seed).stream("e");
+    let m = 200;
+    let slope = 0.5;
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut luck = |rough: f64| -> Vec<f64> {
+        let blocks: Vec<f64> = (0..m / run).map(|_| rough * normal()).collect();
+        (0..m).map(|k| blocks[k / run]).collect()
+    };
+    let real = luck(rough);
+    let noise = luck(0.0);
+    let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
+    let mut draws = Streams::new(seed).stream("d");
+    let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+    let mut sensor = Streams::new(seed).stream("n");
+    let observed: Vec<f64> = (0..m)
+        .map(|k| {
+            let n: f64 = StandardNormal.sample(&mut sensor);
+            real[k] + noise[k] + n
+        })
+        .collect();
+    let residuals: Vec<Vec<f64>> = points
+        .iter()
+        .map(|x| {
+            let l = luck(rough);
+            (0..m).map(|k| slope * x[0] + l[k] - observed[k]).collect()
+        })
+        .collect();
+    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let emulator = Emulator::fit(&region, &p, &r, m, correlated).unwrap();
+    let mut walk = Streams::new(seed).stream("w");
+    let samples = emulator.sample(&[-9.0], &[9.0], 1000, &mut walk);
+    let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 1000.0;
+    let var = samples.iter().map(|s| (s[0] - mean).powi(2)).sum::<f64>() / 1000.0;
+    (mean, var.sqrt())
+}
+
+#[test]
+fn without_roughness_it_is_linear_regression() {
+    // Truth 0, 200 readings of slope 0.5 and noise 1: standard deviation 1 / (0.5 sqrt 200) =
+    // 0.141.
+    for correlated in [false, true] {
+        let (mean, std) = fitted(1, 0.0, 1, correlated);
+        assert!(mean.abs() < 4.0 * 0.141, "{mean}");
+        assert!((std / 0.141 - 1.0).abs() < 0.15, "{std}");
+    }
+}
+
+#[test]
+fn intervals_hold_under_correlated_roughness() {
+    // Roughness of 3 noise standard deviations that lasts 20 readings: ten independent pieces,
+    // so the estimate has a standard deviation of 3 / (0.5 sqrt 10) = 1.9. Independent readings
+    // would give 0.45.
+    for correlated in [false, true] {
+        let runs: Vec<(f64, f64)> = (0..60).map(|s| fitted(s, 3.0, 20, correlated)).collect();
+        let covered = runs.iter().filter(|(m, s)| m.abs() < 1.96 * s).count();
+        eprintln!(
+            "{correlated} {covered} {}",
+            runs.iter().map(|r| r.1).sum::<f64>() / 60.0
+        );
+        // A binomial of 60 at 0.95 is at least 51 with probability 0.998. The box of three
+        // standard deviations of the region cuts the widest posteriors.
+        assert!(covered >= 50, "{covered} of 60");
+    }
+}
+
+#[test]
+fn what_takes_no_part_in_the_luck_keeps_its_weight_if_the_correlation_is_known() {
+    // Roughness moves even readings up and odd ones down together; the unknown moves all up.
+    // The two are orthogonal, so 200 readings of slope 0.5 determine the unknown to 0.141.
+    // Without the correlation each reading has a standard deviation of sqrt(1 + 9), which gives
+    // 0.447.
+    let (m, slope, rough) = (200, 0.5, 3.0);
+    let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
+    let mut rng = Streams::new(3).stream("e");
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let real = rough * normal();
+    let observed: Vec<f64> = (0..m).map(|k| real * side(k) + normal()).collect();
+    let mut draws = Streams::new(3).stream("d");
+    let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+    let residuals: Vec<Vec<f64>> = points
+        .iter()
+        .map(|x| {
+            let luck = rough * normal();
+            let reading = |k: usize| slope * x[0] + luck * side(k) - observed[k];
+            (0..m).map(reading).collect()
+        })
+        .collect();
+    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let [alone, together] = [false, true].map(|correlated| {
+        let emulator = Emulator::fit(&region, &p, &r, m, correlated).unwrap();
+        let mut walk = Streams::new(3).stream("w");
+        let samples = emulator.sample(&[-9.0], &[9.0], 2000, &mut walk);
+        let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 2000.0;
+        assert!(mean.abs() < 4.0 * 0.141, "{mean}");
+        let variance = samples.iter().map(|s| (s[0] - mean).powi(2)).sum::<f64>() / 2000.0;
+        variance.sqrt()
+    });
+    assert!(alone > 0.4, "{alone}");
+    // A fifth of the roughness is treated as independent: sqrt(1 + 0.2 * 9) * 0.141.
+    assert!(together < 0.27, "{together}");
+}
+
+#[test]
+fn each_unknown_is_as_wide_as_its_own_readings_scatter() {
+    // `a` moves readings 1 to 100, which are smooth, and `b` readings 101 to 200, which a shift
+    // of 0.6 moves together. Slopes are 0.5: `a` has a standard deviation of 1 / (0.5 sqrt 100)
+    // = 0.2 and `b` of sqrt(0.2^2 + (0.6 / 0.5)^2) = 1.2.
+    let (m, slope, rough) = (200, 0.5, 0.6);
+    let region = Gaussian::diagonal(&[0.0; 2], &[1.0; 2], &[-9.0; 2], &[9.0; 2]);
+    let mut rng = Streams::new(4).stream("e");
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let observed: Vec<f64> = (0..m).map(|_| normal()).collect();
+    let mut draws = Streams::new(4).stream("d");
+    let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+    let residuals: Vec<Vec<f64>> = points
+        .iter()
+        .map(|x| {
+            let luck = rough * normal();
+            let simulated = |k: usize| {
+                if k < m / 2 {
+                    slope * x[0]
+                } else {
+                    slope * x[1] + luck
+                }
+            };
+            (0..m).map(|k| simulated(k) - observed[k]).collect()
+        })
+        .collect();
+    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+    let mut walk = Streams::new(4).stream("w");
+    let samples = emulator.sample(&[-9.0; 2], &[9.0; 2], 2000, &mut walk);
+    let std = |i: usize| {
+        let mean = samples.iter().map(|s| s[i]).sum::<f64>() / 2000.0;
+        (samples.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>() / 2000.0).sqrt()
+    };
+    assert!((std(0) / 0.2 - 1.0).abs() < 0.3, "{}", std(0));
+    // Slopes and roughness come from 64 points.
+    assert!((std(1) / 1.2 - 1.0).abs() < 0.35, "{}", std(1));
+}
+
+/// The readings show two unknowns only through their product, smoothly, and a third one with a
+/// shift that moves all its readings.
+///
+/// Along the valley of the product nothing is known, so the first unknown spreads over the box.
+/// A normal density about the minimum would hold it near the valley's tangent.
+#[test]
+fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
+    let (m, slope, rough) = (200, 0.5, 3.0);
+    let region = Gaussian::diagonal(&[0.0; 3], &[1.0; 3], &[-9.0; 3], &[9.0; 3]);
+    let mut rng = Streams::new(5).stream("e");
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut draws = Streams::new(5).stream("d");
+    let points: Vec<Vec<f64>> = (0..96).map(|_| region.sample(&mut draws)).collect();
+    let product = |x: &[f64]| (2.0 + x[0]) * (2.0 + x[1]) - 4.0;
+    let residuals: Vec<Vec<f64>> = points
+        .iter()
+        .map(|x| {
+            let luck = rough * normal();
+            let half = |k: usize| k < m / 2;
+            let simulated = |k| if half(k) { product(x) } else { x[2] + luck };
+            (0..m).map(|k| slope * simulated(k)).collect()
+        })
+        .collect();
+    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+    // Of the product, 100 readings of slope 0.5 tell 0.2.
+    let off = |x: [f64; 3]| emulator.loss(&x) - emulator.loss(&[0.0; 3]);
+    let across = off([0.1, 0.1, 0.0]);
+    let wanted = 0.5 * (0.41_f64 / 0.2).powi(2);
+    assert!((across / wanted - 1.0).abs() < 0.1, "{across} {wanted}");
+    // Both points have the product of the middle.
+    for x in [-1.0, 1.5] {
+        let along = off([x, 4.0 / (2.0 + x) - 2.0, 0.0]);
+        assert!(along.abs() < 0.2, "{x}: {along}");
+    }
+}
+
+/// A linear simulator whose minimum lies 5 standard deviations of the region from its middle.
+/// The loss within reach is that of the sandwich about this minimum.
+#[test]
+fn a_minimum_beyond_reach_leaves_the_slope_of_the_sandwich() {
+    let (m, slope, rough, minimum): (usize, f64, f64, f64) = (100, 0.5, 0.6, 5.0);
+    let region = Gaussian::diagonal(&[0.0], &[1.0], &[-9.0], &[9.0]);
+    // Every point twice, with a shift of all readings up and down: the regression is exact.
+    let points: Vec<Vec<f64>> = (0..32)
+        .map(|i| vec![0.2 * f64::from(i / 2) - 1.5])
+        .collect();
+    let residuals: Vec<Vec<f64>> = points
+        .iter()
+        .zip([rough, -rough].into_iter().cycle())
+        .map(|(x, luck)| vec![slope * (x[0] - minimum) + luck; m])
+        .collect();
+    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+    assert!((emulator.best()[0] - REACH).abs() < 1e-6);
+    // Of the noise, and of the shift: 32 points less 3 features tell its variance.
+    let shift = rough.powi(2) * 32.0 / 29.0;
+    let variance = (1.0 / m as f64 + shift) / slope.powi(2);
+    let wanted = |x: f64| 0.5 * (x - minimum).powi(2) / variance;
+    for x in [-2.0, 0.0, 2.0] {
+        let rise = emulator.loss(&[x]) - emulator.loss(&[REACH]);
+        let right = wanted(x) - wanted(REACH);
+        assert!((rise / right - 1.0).abs() < 1e-3, "{x}: {rise} {right}");
+    }
+}
+
+#[test]
+fn slopes_are_derivatives_of_features() {
+    let u = [0.3, -0.7, 1.1];
+    let h = 1e-6;
+    for k in 0..3 {
+        let (mut up, mut down) = (u, u);
+        up[k] += h;
+        down[k] -= h;
+        for ((a, b), s) in features(&up)
+            .iter()
+            .zip(features(&down))
+            .zip(feature_slope(&u, k))
+        {
+            assert!(((a - b) / (2.0 * h) - s).abs() < 1e-8);
+        }
+    }
+}
