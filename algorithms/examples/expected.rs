@@ -14,11 +14,13 @@
 //! to actual deviation. The expectations are:
 //!
 //! 1. the one that rewards explorers,
-//! 2. the one by the noise model of the identifier, as `exploration.expected_std` of a run. With
-//!    `reps/sampling.correlated=true` both weigh readings by the whole covariance.
+//! 2. the one by the noise model of identification with the identifier's assumptions, as
+//!    `exploration.expected_std` of a run; NaN where there is no fit, and for binary unknowns. With
+//!    `reps/sampling.correlated=true` this one and the identifier weigh readings by the whole
+//!    covariance.
 //!
-//! The table gives the median of each ratio, the quartiles of the second, and how often the 95 %
-//! interval holds the truth.
+//! The table gives the medians of both ratios, the quartiles of the second, and in how many episodes
+//! the 95 % interval holds the truth.
 
 // This program exists to print a table on standard output.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -89,11 +91,7 @@ fn main() -> Outcome<()> {
             ..ExpectedSettings::default()
         };
         let expected = expected_deviation(&problem, &settings, &theta, start, &real.actions)?;
-        let last = |rows: &Option<Vec<Vec<f64>>>, i: usize| {
-            rows.as_ref()
-                .and_then(|r| r.last())
-                .map_or(f64::NAN, |r| r[i])
-        };
+        let last = expected.as_ref().and_then(|rows| rows.last());
         for (i, (p, m)) in parameters
             .iter()
             .zip(&found.posterior.marginals)
@@ -101,7 +99,7 @@ fn main() -> Outcome<()> {
         {
             let ways = [
                 p.unscale_std(theta[i], paid[i]) / m.std,
-                last(&expected, i) / m.std,
+                last.map_or(f64::NAN, |row| row[i]) / m.std,
             ];
             println!(
                 "{seed} {}: truth {:.4e} estimate {:.4e} std {:.2e} ({:.2} of the prior's) off {:.2} std, residual {:.2}, roughness {:.2}: {:.2} {:.2}",
@@ -180,9 +178,9 @@ fn merge(into: &mut Settings, from: Settings) {
     }
 }
 
-/// Interpolates between the two nearest values.
+/// Interpolates between the two nearest of the finite values.
 fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
-    let mut values: Vec<f64> = values.collect();
+    let mut values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else {
         return f64::NAN;

@@ -97,14 +97,16 @@ pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> 
     Some((h + DMatrix::identity(n, n) * ridge).cholesky()?.l())
 }
 
-/// Divisor of a loss with curvature `H = L L^T` that gives it the width of the sandwich formula.
+/// How a loss with curvature `H = L L^T` is divided so that it has the width of the sandwich formula.
 ///
-/// In the coordinates of [`inflation`], direction `i` is wider than `H` implies by a ratio `v_i`, at
-/// least 1. Returned are the largest ratio `v` and the matrix with the eigenvalues `1 / v_i - 1 / v`.
-/// The loss over `v`, and half the square of `L^-1 B^T P e` in this matrix, have together the
-/// curvature `L diag(1 / v_i) L^T`. Each direction is widened by what *its* readings scatter, so that
-/// an unknown that smooth readings determine keeps its narrow interval beside one that rough readings
-/// determine (curvature adjustment: Ribatet, Cooley and Davison 2012).
+/// Along axis `i` of [`inflation`] the sandwich has `v_i` times the variance that `H` implies. A
+/// ratio below 1 counts as 1, so that no direction becomes narrower than the weights imply. Returned
+/// are the largest ratio `v` and the matrix `X` with the same axes and the eigenvalues
+/// `1 / v_i - 1 / v`. With `w = L^-1 B^T P e`, the sum of the loss over `v` and of `w^T X w / 2` has
+/// the curvature `L V^-1 L^T`, where `V` has the eigenvalues `v_i`. Each direction is widened by what
+/// *its* readings scatter, so that an unknown that smooth readings determine keeps its narrow
+/// interval beside one that rough readings determine (curvature adjustment: Ribatet, Cooley and
+/// Davison 2012).
 #[must_use]
 pub fn tempered(inflation: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
     let eigen = symmetric_eigen((inflation + inflation.transpose()) * 0.5)?;
@@ -115,9 +117,9 @@ pub fn tempered(inflation: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
     Some((most, &axes * further * axes.transpose()))
 }
 
-/// Information of the sandwich formula, as [`tempered`] divides the curvature `h`.
+/// Information of the sandwich formula: the curvature `h`, divided as by [`tempered`].
 ///
-/// `lower` is the factor of `h`, of [`implied`], which adds a ridge.
+/// `lower` is the factor of `h` with the ridge of [`implied`], which is negligible here.
 #[must_use]
 pub fn informed(
     h: &DMatrix<f64>,

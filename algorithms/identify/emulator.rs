@@ -15,13 +15,15 @@
 //!
 //! `H^-1 B^T W (1 + R) W B H^-1`, `H = B^T W B`, `B = de/dx`, `R = cov(epsilon)`
 //!
-//! The loss is divided by the largest ratio of the sandwich to the naive covariance along any
-//! direction (a temperature). Along other directions the sandwich knows more than that. With
-//! `H = L L^T`, `w = L^-1 B^T W e` are the parts of the weighed residual that the unknowns move, and
-//! the sandwich is their covariance. So each is divided by its own ratio ([`tempered`]): an unknown
-//! that smooth readings determine keeps its narrow interval beside one that rough readings
-//! determine. This is a function of the residual alone. Where the readings show only a product of
-//! two unknowns, it is therefore constant along the curved valley, as the loss is.
+//! The loss is divided by the largest ratio `v` of the sandwich to the naive covariance along any
+//! direction (a temperature). Along other directions the sandwich is narrower than that. With
+//! `H = L L^T`, `w = L^-1 B^T W e` is the part of the weighed residual that the unknowns move at the
+//! best point. Its covariance `L^-1 B^T W (1 + R) W B L^-T` is the sandwich in the coordinates
+//! `L^T x`. Along each principal axis of it, the square of `w` is divided by the ratio of that axis
+//! instead of `v` ([`tempered`]): an unknown that smooth readings determine keeps its narrow
+//! interval beside one that rough readings determine. What is left of the residual is divided by
+//! `v`. The loss stays a function of the residual alone. Where the readings show only a product of
+//! two unknowns, it is therefore constant along the curved valley.
 //!
 //! Where the emulator does not explain the observation within noise and roughness, all is divided
 //! by the mismatch. Points are never selected by how well they fit, which would bias the result.
@@ -45,10 +47,11 @@ pub struct Emulator {
     region: Gaussian,
     /// `A^T W A`, features x features.
     gram: DMatrix<f64>,
+    /// The matrix of the widened loss, `phi^T G phi / 2`: as wide as the sandwich, and divided by the
+    /// mismatch.
+    widened: DMatrix<f64>,
     /// Best point within reach, standardised.
     best: DVector<f64>,
-    /// The same, as wide as the sandwich.
-    widened: DMatrix<f64>,
     /// Root mean square of the emulated whitened residual at its best point.
     pub residual: f64,
     /// Root mean square of the roughness, in units of the sensors' noise.
@@ -64,7 +67,7 @@ pub fn features_len(n: usize) -> usize {
     1 + n + n * (n + 1) / 2
 }
 
-/// Quadratic features `1, u, u u^T` (upper triangle). Derivative of the features, `d phi / d u_k`.
+/// Quadratic features `1, u, u u^T` (upper triangle).
 fn features(u: &[f64]) -> Vec<f64> {
     let mut phi = Vec::with_capacity(features_len(u.len()));
     phi.push(1.0);
@@ -191,7 +194,7 @@ impl Emulator {
         half_square(&self.gram, u)
     }
 
-    /// Loss at a point of the search space, as wide as the sandwich.
+    /// Loss at a point of the search space, as wide as the sandwich and divided by the mismatch.
     #[must_use]
     pub fn loss(&self, x: &[f64]) -> f64 {
         half_square(&self.widened, &self.region.standardise(x))

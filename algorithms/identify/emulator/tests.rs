@@ -155,8 +155,8 @@ fn each_unknown_is_as_wide_as_its_own_readings_scatter() {
 /// The readings show two unknowns only through their product, smoothly, and a third one with a
 /// shift that moves all its readings.
 ///
-/// Along the valley of the product nothing is known, so the first unknown spreads over the box.
-/// A normal density about the minimum would hold it near the valley's tangent.
+/// Along the valley of the product nothing is known, so the loss is constant there. A normal density
+/// about the minimum would rise away from the valley's tangent.
 #[test]
 fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
     let (m, slope, rough) = (200, 0.5, 3.0);
@@ -190,33 +190,47 @@ fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
     }
 }
 
-/// A linear simulator whose minimum lies 5 standard deviations of the region from its middle.
-/// The loss within reach is that of the sandwich about this minimum.
+/// A linear simulator of two unknowns: `a` moves smooth readings and has its minimum 5 standard
+/// deviations of the region from its middle; `b` moves readings that a shift moves together. The loss
+/// within reach is that of the sandwich about this minimum.
 #[test]
 fn a_minimum_beyond_reach_leaves_the_slope_of_the_sandwich() {
     let (m, slope, rough, minimum): (usize, f64, f64, f64) = (100, 0.5, 0.6, 5.0);
-    let region = Gaussian::diagonal(&[0.0], &[1.0], &[-9.0], &[9.0]);
-    // Every point twice, with a shift of all readings up and down: the regression is exact.
-    let points: Vec<Vec<f64>> = (0..32)
-        .map(|i| vec![0.2 * f64::from(i / 2) - 1.5])
+    let region = Gaussian::diagonal(&[0.0; 2], &[1.0; 2], &[-9.0; 2], &[9.0; 2]);
+    // Every point twice, with a shift of the readings of `b` up and down: the regression is exact.
+    let points: Vec<Vec<f64>> = (0..64)
+        .map(|i| i / 2)
+        .map(|i| vec![0.4 * f64::from(i % 8) - 1.4, 0.8 * f64::from(i / 8) - 1.2])
         .collect();
     let residuals: Vec<Vec<f64>> = points
         .iter()
         .zip([rough, -rough].into_iter().cycle())
-        .map(|(x, luck)| vec![slope * (x[0] - minimum) + luck; m])
+        .map(|(x, luck)| {
+            let of_a = vec![slope * (x[0] - minimum); m];
+            [of_a, vec![slope * x[1] + luck; m]].concat()
+        })
         .collect();
     let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
     let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-    let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
-    assert!((emulator.best()[0] - REACH).abs() < 1e-6);
-    // Of the noise, and of the shift: 32 points less 3 features tell its variance.
-    let shift = rough.powi(2) * 32.0 / 29.0;
-    let variance = (1.0 / m as f64 + shift) / slope.powi(2);
-    let wanted = |x: f64| 0.5 * (x - minimum).powi(2) / variance;
-    for x in [-2.0, 0.0, 2.0] {
-        let rise = emulator.loss(&[x]) - emulator.loss(&[REACH]);
-        let right = wanted(x) - wanted(REACH);
-        assert!((rise / right - 1.0).abs() < 1e-3, "{x}: {rise} {right}");
+    let emulator = Emulator::fit(&region, &p, &r, 2 * m, false).unwrap();
+    let best = emulator.best();
+    assert!(
+        (best[0] - REACH).abs() < 1e-4 && best[1].abs() < 1e-4,
+        "{best:?}"
+    );
+    // Of the noise, and of the shift: 64 points less 6 features tell its variance.
+    let shift = rough.powi(2) * 64.0 / 58.0;
+    let variance = [0.0, shift].map(|shift| (1.0 / m as f64 + shift) / slope.powi(2));
+    let wanted = |x: [f64; 2]| {
+        0.5 * (x[0] - minimum).powi(2) / variance[0] + 0.5 * x[1].powi(2) / variance[1]
+    };
+    // At the best point the emulator explains less than noise and roughness leave.
+    let mismatch =
+        (m as f64 * (slope * (REACH - minimum)).powi(2) / (2.0 * m as f64 - 2.0)).max(1.0);
+    for x in [[-2.0, 0.0], [0.0, 1.0], [2.0, -1.0]] {
+        let rise = emulator.loss(&x) - emulator.loss(&[REACH, 0.0]);
+        let right = (wanted(x) - wanted([REACH, 0.0])) / mismatch;
+        assert!((rise / right - 1.0).abs() < 1e-3, "{x:?}: {rise} {right}");
     }
 }
 
