@@ -240,9 +240,9 @@ impl Emulator {
         self.region.unstandardise(self.best.as_slice())
     }
 
-    /// Draws `count` equally weighted points of the posterior by a Metropolis walk.
+    /// Draws `count` equally weighted points of the posterior by an ensemble of walkers.
     ///
-    /// The walk stays inside the box and within reach of the region's middle.
+    /// The walkers stay inside the box and within reach of the region's middle.
     pub fn sample(&self, low: &[f64], high: &[f64], count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = self.region.mean().len();
         let inside = |u: &[f64]| {
@@ -265,7 +265,7 @@ impl Emulator {
                 .collect();
             u = self.region.standardise(&x);
         }
-        // Proposal steps follow the curvature at the best point, scaled for a good acceptance rate.
+        // The walkers begin with the curvature at the best point.
         let slopes: Vec<DVector<f64>> = (0..n)
             .map(|k| DVector::from_vec(feature_slope(&u, k)))
             .collect();
