@@ -40,11 +40,16 @@ fn scene(kp: f64, force: f64) -> Scene {
 
 /// A log in which the slide oscillates under a constant command to one side.
 fn logs(machine: &Machine) -> Logs {
-    let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
+    let time = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
+    logs_at(machine, time, vec![0.12; ROWS])
+}
+
+/// A log of the slide at some times (s) under some commands, one per row.
+pub(crate) fn logs_at(machine: &Machine, time: Vec<f64>, ctrl: Vec<f64>) -> Logs {
     let episode = Episode {
         readings: time.iter().map(|t| 0.1 * (5.0 * t).sin()).collect(),
         actuators: vec!["pull".into()],
-        ctrl: vec![0.12; ROWS],
+        ctrl,
         channels: vec![ChannelColumns {
             name: "x".into(),
             len: 1,

@@ -1,14 +1,13 @@
 //! Derivatives along segments: replays by many rows at once against replays row by row.
 
-use asid::core::episode::ChannelColumns;
-use asid::core::{BatchConfig, Control, Episode, Model as _, Rollout, Scene, Simulator as _};
+use asid::core::{BatchConfig, Control, Model as _, Rollout, Scene, Simulator as _};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::step_map::{Anew, Derivatives, StepMap};
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
 use asid::effects::EffectSpec;
 
-use super::row_slopes::largest_difference;
+use super::row_slopes::{largest_difference, logs_at};
 use crate::diagnosis_support::engine;
 
 /// Time step, s.
@@ -40,18 +39,8 @@ fn logs(machine: &Machine) -> Logs {
         let steps = if k < 100 { 10 } else { [8, 12, 9][k % 3] };
         time.push(time[k] + f64::from(steps) * DT);
     }
-    let episode = Episode {
-        readings: time.iter().map(|t| 0.1 * (5.0 * t).sin()).collect(),
-        actuators: vec!["pull".into()],
-        ctrl: (0..ROWS).map(|k| 0.12 * (0.7 * k as f64).sin()).collect(),
-        channels: vec![ChannelColumns {
-            name: "x".into(),
-            len: 1,
-        }],
-        time,
-        ..Episode::default()
-    };
-    Logs::new(&machine.plant, &["x".into()], vec![("log".into(), episode)]).unwrap()
+    let command = |k: usize| 0.12 * (0.7 * k as f64).sin();
+    logs_at(machine, time, (0..ROWS).map(command).collect())
 }
 
 /// Effects that remember commands and readings, and one on forces.

@@ -2,6 +2,30 @@ use super::*;
 use asid_core::Streams;
 use rand_distr::{Distribution, StandardNormal};
 
+/// A region of unit width about a middle, in a box of 9 to both sides.
+fn about(middle: &[f64]) -> Gaussian {
+    let n = middle.len();
+    Gaussian::diagonal(middle, &vec![1.0; n], &vec![-9.0; n], &vec![9.0; n])
+}
+
+/// Draws points from a region.
+fn points(region: &Gaussian, count: usize, seed: u64) -> Vec<Vec<f64>> {
+    let mut draws = Streams::new(seed).stream("d");
+    (0..count).map(|_| region.sample(&mut draws)).collect()
+}
+
+/// Fits residuals of which none is missing.
+fn fit(
+    region: &Gaussian,
+    points: &[Vec<f64>],
+    residuals: &[Vec<f64>],
+    correlated: bool,
+) -> Emulator {
+    let points: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+    let rows: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+    Emulator::fit(region, &points, &rows, rows[0].len(), correlated).unwrap()
+}
+
 /// Fits one draw of noise from a linear simulator with 200 readings; returns the estimate and
 /// its standard deviation.
 ///
@@ -17,9 +41,8 @@ fn fitted(seed: u64, rough: f64, run: usize, correlated: bool) -> (f64, f64) {
     };
     let real = luck(rough);
     let noise = luck(0.0);
-    let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
-    let mut draws = Streams::new(seed).stream("d");
-    let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+    let region = about(&[0.2]);
+    let points = points(&region, 64, seed);
     let mut sensor = Streams::new(seed).stream("n");
     let observed: Vec<f64> = (0..m)
         .map(|k| {
@@ -34,9 +57,7 @@ fn fitted(seed: u64, rough: f64, run: usize, correlated: bool) -> (f64, f64) {
             (0..m).map(|k| slope * x[0] + l[k] - observed[k]).collect()
         })
         .collect();
-    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
-    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-    let emulator = Emulator::fit(&region, &p, &r, m, correlated).unwrap();
+    let emulator = fit(&region, &points, &residuals, correlated);
     let mut walk = Streams::new(seed).stream("w");
     let samples = emulator.sample(&[-9.0], &[9.0], 1000, &mut walk);
     let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 1000.0;
@@ -80,14 +101,13 @@ fn what_takes_no_part_in_the_luck_keeps_its_weight_if_the_correlation_is_known()
     // Without the correlation each reading has a standard deviation of sqrt(1 + 9), which gives
     // 0.447.
     let (m, slope, rough) = (200, 0.5, 3.0);
-    let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
+    let region = about(&[0.2]);
     let mut rng = Streams::new(3).stream("e");
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
     let real = rough * normal();
     let observed: Vec<f64> = (0..m).map(|k| real * side(k) + normal()).collect();
-    let mut draws = Streams::new(3).stream("d");
-    let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+    let points = points(&region, 64, 3);
     let residuals: Vec<Vec<f64>> = points
         .iter()
         .map(|x| {
@@ -96,10 +116,8 @@ fn what_takes_no_part_in_the_luck_keeps_its_weight_if_the_correlation_is_known()
             (0..m).map(reading).collect()
         })
         .collect();
-    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
-    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
     let [alone, together] = [false, true].map(|correlated| {
-        let emulator = Emulator::fit(&region, &p, &r, m, correlated).unwrap();
+        let emulator = fit(&region, &points, &residuals, correlated);
         let mut walk = Streams::new(3).stream("w");
         let samples = emulator.sample(&[-9.0], &[9.0], 2000, &mut walk);
         let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 2000.0;
@@ -118,12 +136,11 @@ fn each_unknown_is_as_wide_as_its_own_readings_scatter() {
     // of 0.6 moves together. Slopes are 0.5: `a` has a standard deviation of 1 / (0.5 sqrt 100)
     // = 0.2 and `b` of sqrt(0.2^2 + (0.6 / 0.5)^2) = 1.2.
     let (m, slope, rough) = (200, 0.5, 0.6);
-    let region = Gaussian::diagonal(&[0.0; 2], &[1.0; 2], &[-9.0; 2], &[9.0; 2]);
+    let region = about(&[0.0; 2]);
     let mut rng = Streams::new(4).stream("e");
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
     let observed: Vec<f64> = (0..m).map(|_| normal()).collect();
-    let mut draws = Streams::new(4).stream("d");
-    let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+    let points = points(&region, 64, 4);
     let residuals: Vec<Vec<f64>> = points
         .iter()
         .map(|x| {
@@ -138,9 +155,7 @@ fn each_unknown_is_as_wide_as_its_own_readings_scatter() {
             (0..m).map(|k| simulated(k) - observed[k]).collect()
         })
         .collect();
-    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
-    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-    let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+    let emulator = fit(&region, &points, &residuals, false);
     let mut walk = Streams::new(4).stream("w");
     let samples = emulator.sample(&[-9.0; 2], &[9.0; 2], 2000, &mut walk);
     let std = |i: usize| {
@@ -160,11 +175,10 @@ fn each_unknown_is_as_wide_as_its_own_readings_scatter() {
 #[test]
 fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
     let (m, slope, rough) = (200, 0.5, 3.0);
-    let region = Gaussian::diagonal(&[0.0; 3], &[1.0; 3], &[-9.0; 3], &[9.0; 3]);
+    let region = about(&[0.0; 3]);
     let mut rng = Streams::new(5).stream("e");
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-    let mut draws = Streams::new(5).stream("d");
-    let points: Vec<Vec<f64>> = (0..96).map(|_| region.sample(&mut draws)).collect();
+    let points = points(&region, 96, 5);
     let product = |x: &[f64]| (2.0 + x[0]) * (2.0 + x[1]) - 4.0;
     let residuals: Vec<Vec<f64>> = points
         .iter()
@@ -175,9 +189,7 @@ fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
             (0..m).map(|k| slope * simulated(k)).collect()
         })
         .collect();
-    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
-    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-    let emulator = Emulator::fit(&region, &p, &r, m, false).unwrap();
+    let emulator = fit(&region, &points, &residuals, false);
     // Of the product, 100 readings of slope 0.5 tell 0.2.
     let off = |x: [f64; 3]| emulator.loss(&x) - emulator.loss(&[0.0; 3]);
     let across = off([0.1, 0.1, 0.0]);
@@ -196,7 +208,7 @@ fn a_curved_valley_stays_open_beside_an_unknown_that_scatters() {
 #[test]
 fn a_minimum_beyond_reach_leaves_the_slope_of_the_sandwich() {
     let (m, slope, rough, minimum): (usize, f64, f64, f64) = (100, 0.5, 0.6, 5.0);
-    let region = Gaussian::diagonal(&[0.0; 2], &[1.0; 2], &[-9.0; 2], &[9.0; 2]);
+    let region = about(&[0.0; 2]);
     // Every point twice, with a shift of the readings of `b` up and down: the regression is exact.
     let points: Vec<Vec<f64>> = (0..64)
         .map(|i| i / 2)
@@ -210,9 +222,7 @@ fn a_minimum_beyond_reach_leaves_the_slope_of_the_sandwich() {
             [of_a, vec![slope * x[1] + luck; m]].concat()
         })
         .collect();
-    let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
-    let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-    let emulator = Emulator::fit(&region, &p, &r, 2 * m, false).unwrap();
+    let emulator = fit(&region, &points, &residuals, false);
     let best = emulator.best();
     assert!(
         (best[0] - REACH).abs() < 1e-4 && best[1].abs() < 1e-4,
