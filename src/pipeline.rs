@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use asid_algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
 use asid_algorithms::fisher::{FisherBatch, FisherSettings, Form};
+use asid_algorithms::identify::expected::{ExpectedSettings, expected_deviation};
 use asid_core::error::Result;
 use asid_core::explore::{CurvePoint, Explorer};
 use asid_core::identify::{Identified, Identifier};

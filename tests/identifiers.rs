@@ -9,7 +9,7 @@ mod cart_support;
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
-use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
+use asid::algorithms::identify::expected::{ExpectedSettings, expected_deviation};
 use asid::core::identify::Identified;
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::posterior::Edge;
@@ -168,8 +168,9 @@ fn a_search_begins_anew_where_its_fit_misses_the_readings_and_not_where_it_expla
     };
     let (once, twice) = (rounds(0, 0.03), rounds(1, 0.03));
     assert!(once.0 > 1.5 && twice.0 <= once.0, "{once:?} {twice:?}");
-    assert_eq!(twice.1, 2 * once.1);
-    assert_eq!(rounds(1, 0.0).1, once.1);
+    // The number of rounds after a search depends on its end.
+    assert!(2 * twice.1 > 3 * once.1, "{once:?} {twice:?}");
+    assert_eq!(rounds(1, 0.0), rounds(0, 0.0));
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod cart_support;
 #[allow(dead_code)]
 mod task_support;
 
-use asid::algorithms::fisher::expected::ExpectedSettings;
+use asid::algorithms::identify::expected::ExpectedSettings;
 use asid::core::parameter::Scale;
 use asid::core::registry::{
     BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, find,

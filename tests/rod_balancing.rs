@@ -7,8 +7,8 @@
 mod task_support;
 
 use asid::algorithms::fisher::FisherSettings;
-use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
 use asid::algorithms::identify::Likelihood;
+use asid::algorithms::identify::expected::{ExpectedSettings, expected_deviation};
 use asid::core::identify::Assumptions;
 use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, all, find};
 use asid::core::tracker::TrackerPrior;

@@ -28,8 +28,8 @@
 use std::error::Error;
 use std::sync::atomic::AtomicU64;
 
-use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
 use asid::algorithms::fisher::{FisherBatch, FisherSettings};
+use asid::algorithms::identify::expected::{ExpectedSettings, expected_deviation};
 use asid::core::progress::Silent;
 use asid::core::registry::{
     AlgorithmEntry, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Settings, TaskEntry, find,

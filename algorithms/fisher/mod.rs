@@ -2,13 +2,12 @@
 //!
 //! - [`FisherBatch`] plays episodes with their information, as [`FisherSettings`] say.
 //! - [`Information`] sums it up and scores it.
-//! - [`expected`] computes the standard deviation that an identification should reach, from fits of
-//!   the readings over a region ([`local_fit`], [`precision`]).
+//! - [`local_fit`] fits the readings over a region, and [`precision`] weighs them by noise and
+//!   roughness.
 //! - [`inert`] finds unknowns that change no reading.
 
 mod batch;
 mod eigen;
-pub mod expected;
 pub mod inert;
 mod information;
 pub mod local_fit;

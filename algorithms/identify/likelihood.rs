@@ -16,10 +16,39 @@ use asid_readings::{SignalSet, SystematicErrors};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Largest offset of a start pose from its first reading, in standard deviations of that reading.
-const START_BOUND: f64 = 6.0;
+pub const START_BOUND: f64 = 6.0;
 
 /// Number of draws that measure how the tracker's noise spreads the located start pose.
 const LOCATE_DRAWS: usize = 256;
+
+/// Standard deviation of the start pose that one reading of the tracked signals locates, by the
+/// trackers' noise.
+#[must_use]
+pub fn start_deviation(problem: &Problem<'_>, signals: &SignalSet, reading: &[f64]) -> Vec<f64> {
+    let start = problem.task.locate(reading);
+    let mut rng = problem.streams.stream("locate");
+    let mut squares = vec![0.0; start.len()];
+    for _ in 0..LOCATE_DRAWS {
+        let mut noisy = reading.to_vec();
+        signals.add_noise(&mut noisy, || StandardNormal.sample(&mut rng));
+        let located = problem.task.locate(&noisy);
+        for (square, (a, b)) in squares.iter_mut().zip(located.iter().zip(&start)) {
+            // Angles may jump by a full turn, which is no spread.
+            let d = a - b;
+            let turn = std::f64::consts::PI;
+            let d = if d.abs() > turn {
+                d - d.signum() * 2.0 * turn
+            } else {
+                d
+            };
+            *square += d * d;
+        }
+    }
+    squares
+        .iter()
+        .map(|q| (q / LOCATE_DRAWS as f64).sqrt().max(1e-9))
+        .collect()
+}
 
 struct Observed {
     replay: Replay,
@@ -77,26 +106,7 @@ impl<'a> Likelihood<'a> {
                     ))
                 })?;
             let start = problem.task.locate(first);
-            let mut rng = problem.streams.stream("locate");
-            let mut squares = vec![0.0; start.len()];
-            for _ in 0..LOCATE_DRAWS {
-                let mut noisy = first.to_vec();
-                signals.add_noise(&mut noisy, || StandardNormal.sample(&mut rng));
-                for (q, (a, b)) in squares
-                    .iter_mut()
-                    .zip(problem.task.locate(&noisy).iter().zip(&start))
-                {
-                    // Angles may jump by a full turn, which is no spread.
-                    let d = a - b;
-                    let turn = std::f64::consts::PI;
-                    let d = if d.abs() > turn {
-                        d - d.signum() * 2.0 * turn
-                    } else {
-                        d
-                    };
-                    *q += d * d;
-                }
-            }
+            let start_std = start_deviation(problem, &signals, first);
             let mut there = Vec::new();
             for row in readings.chunks_exact(width) {
                 signals.difference(row, row, &mut whitened);
@@ -109,10 +119,7 @@ impl<'a> Likelihood<'a> {
                 time: episode.time.clone(),
                 there,
                 start,
-                start_std: squares
-                    .iter()
-                    .map(|q| (q / LOCATE_DRAWS as f64).sqrt().max(1e-9))
-                    .collect(),
+                start_std,
             });
         }
         Ok(Self {

@@ -10,7 +10,7 @@ pub mod beyond;
 pub mod cem;
 pub mod cma_es;
 pub mod emulator;
-
+pub mod expected;
 pub mod gauss_newton;
 pub mod likelihood;
 pub mod models;

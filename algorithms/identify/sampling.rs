@@ -23,8 +23,16 @@ use crate::optimise::{Gaussian, require};
 /// the region, and no measure of its true width.
 const OUTSIDE: f64 = 2.0;
 
+/// Standard deviation of a posterior along any direction, in standard deviations of the
+/// region, above which the region is too narrow.
+///
+/// The posterior is then cut by the region ([`REACH`]), and its width is that of the region. A
+/// region that is as wide as it should be has twice the width of the posterior
+/// ([`SamplingSettings::widen`]).
+const CUT: f64 = 1.0;
+
 /// Maximum number of rounds, in multiples of those of the settings: a round that only moves the
-/// region does not count as one of these.
+/// or widens the region does not count as one of these.
 const PATIENCE: usize = 3;
 
 /// How the posterior is sampled after the search.
@@ -169,6 +177,17 @@ pub fn summary(
     }
 }
 
+/// The region that follows a posterior, and whether the posterior has its own width and not that of
+/// the region which it was drawn in.
+fn next_region(region: &Gaussian, posterior: &Gaussian, widen: f64) -> (Gaussian, bool) {
+    let off = region.standardise(posterior.mean());
+    if off.iter().any(|u| u.abs() > OUTSIDE) {
+        return (region.moved_to(posterior.mean()), false);
+    }
+    let settled = region.largest_ratio(posterior) <= CUT;
+    (posterior.widened(widen), settled)
+}
+
 /// Evidence for a model.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence {
@@ -228,13 +247,9 @@ pub fn posterior(
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
         let posterior =
             Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)?;
-        let off = region.standardise(posterior.mean());
-        region = if off.iter().any(|u| u.abs() > OUTSIDE) {
-            region.moved_to(posterior.mean())
-        } else {
-            narrowed += 1;
-            posterior.widened(settings.widen)
-        };
+        let settled;
+        (region, settled) = next_region(&region, &posterior, settings.widen);
+        narrowed += usize::from(settled);
         found = Some((emulator, drawn));
         if round <= rounds {
             problem.progress.advance(1);
@@ -263,4 +278,36 @@ pub fn posterior(
         roughness: emulator.roughness,
     };
     Ok((identified, evidence))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn normal(mean: [f64; 2], std: [f64; 2]) -> Gaussian {
+        Gaussian::diagonal(&mean, &std, &[-99.0; 2], &[99.0; 2])
+    }
+
+    /// Symptom: on the shuffleboard the deviation of the sliding friction was up to three times too
+    /// small. Cause: rounds ended while the region still cut the start pose, and what a region cuts
+    /// looks known.
+    #[test]
+    fn a_round_whose_region_cuts_the_posterior_does_not_count() {
+        let region = normal([0.0; 2], [1.0; 2]);
+        // A uniform density over three standard deviations to either side has 1.7 of them.
+        let (next, settled) = next_region(&region, &normal([0.0; 2], [0.1, 1.7]), 2.0);
+        assert!(!settled);
+        assert_eq!(next.std(), [0.2, 3.4]);
+        let (next, settled) = next_region(&next, &normal([0.1; 2], [0.1, 1.7]), 2.0);
+        assert!(settled);
+        assert_eq!(next.std(), [0.2, 3.4]);
+    }
+
+    #[test]
+    fn a_posterior_at_the_end_of_its_region_moves_the_region() {
+        let region = normal([0.0; 2], [1.0; 2]);
+        let (next, settled) = next_region(&region, &normal([2.5, 0.0], [0.1; 2]), 2.0);
+        assert!(!settled);
+        assert_eq!((next.mean(), next.std()), (&[2.5, 0.0][..], vec![1.0; 2]));
+    }
 }

@@ -162,6 +162,14 @@ impl Gaussian {
         (0..self.mean.len()).map(|i| l.row(i).norm()).collect()
     }
 
+    /// The largest standard deviation of another distribution along any direction, in standard
+    /// deviations of this one.
+    #[must_use]
+    pub fn largest_ratio(&self, other: &Self) -> f64 {
+        let ratio = self.factor.solve_lower_triangular(&other.factor);
+        ratio.map_or(f64::INFINITY, |ratio| ratio.singular_values().max())
+    }
+
     /// Coordinates of `x` in which the distribution is a standard normal one.
     #[must_use]
     pub fn standardise(&self, x: &[f64]) -> Vec<f64> {
@@ -245,6 +253,18 @@ mod tests {
         .unwrap();
         // Standard errors are about 1/sqrt(20000) = 0.007.
         assert!((fit.mean()[0] - 0.3).abs() < 0.03 && (fit.std()[0] - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn the_largest_ratio_is_that_of_the_worst_direction() {
+        let of = |covariance: [f64; 4]| {
+            let covariance = DMatrix::from_row_slice(2, 2, &covariance);
+            Gaussian::new(DVector::zeros(2), covariance, &[-9.0; 2], &[9.0; 2]).unwrap()
+        };
+        // Variance 1.8 along the sum and 0.2 along the difference, against 1 and 1.
+        let (round, tilted) = (of([1.0, 0.0, 0.0, 1.0]), of([1.0, 0.8, 0.8, 1.0]));
+        assert!((round.largest_ratio(&tilted) - 1.8_f64.sqrt()).abs() < 1e-12);
+        assert!((tilted.largest_ratio(&round) - 0.2_f64.sqrt().recip()).abs() < 1e-12);
     }
 
     #[test]

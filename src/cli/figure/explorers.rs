@@ -8,7 +8,7 @@ mod shown;
 use crate::pipeline::episode_information_as;
 use anyhow::Result;
 use asid_algorithms::fisher::FisherSettings;
-use asid_algorithms::fisher::expected::ExpectedSettings;
+use asid_algorithms::identify::expected::ExpectedSettings;
 use asid_core::RealWorld as _;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, find};
 

@@ -1,7 +1,7 @@
 //! Effort of predicting what an episode tells.
 
 use anyhow::Result;
-use asid_algorithms::fisher::expected::ExpectedSettings;
+use asid_algorithms::identify::expected::ExpectedSettings;
 use schemars::JsonSchema;
 use serde::Serialize;
 

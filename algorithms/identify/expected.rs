@@ -6,10 +6,11 @@
 //! several times too small.
 //!
 //! This module uses the noise model of identification: slopes and roughness from a [`LocalFit`].
-//! The region of the fit is narrowed down to that of the posterior, because an identifier also
-//! learns how rough the simulator is there.
+//! As in an identifier, the region of the fit follows that of the posterior from round to round, the
+//! simulations of earlier rounds are used again, and the start pose is as uncertain as one reading
+//! of the trackers.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::fisher::inverse_above_prior;
 use crate::fisher::local_fit::{LocalFit, design, sets};
@@ -19,8 +20,11 @@ use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
 use asid_core::simulator::{Control, Rollout};
-use asid_core::tracker::{ReadingFrames, TrackerPrior};
+use asid_core::tracker::ReadingFrames;
 use asid_readings::{SignalSet, SystematicErrors};
+
+use super::emulator::REACH;
+use super::likelihood::{START_BOUND, start_deviation};
 
 /// Settings of the computation of expected standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +32,8 @@ pub struct ExpectedSettings {
     /// What the identifier assumes about the readings.
     pub assumes: Assumptions,
     /// Number of fits, each over the region that the previous one found. On the shuffleboard, where
-    /// convergence takes longest, the standard deviation stays within a third of its value from the
-    /// seventh fit on.
+    /// convergence takes longest, the standard deviation stays within a tenth of its value from the
+    /// fifth fit on.
     pub rounds: usize,
     /// Standard deviations of a region in units of the posterior's, as in an identifier.
     pub widen: f64,
@@ -39,22 +43,18 @@ impl Default for ExpectedSettings {
     fn default() -> Self {
         Self {
             assumes: Assumptions::default(),
-            rounds: 7,
+            rounds: 5,
             widen: 2.0,
         }
     }
 }
 
-/// Initial half step of an unknown (in prior standard deviations) and of a start coordinate (in
-/// standard deviations of its range): those of [`crate::fisher`].
+/// Initial half step of an unknown and of a start coordinate, in prior standard deviations.
 ///
-/// They are wider than what most episodes leave of the prior, as an identifier's first region is.
-/// In a region that is too narrow the simulator may be smooth by chance, and the following regions
-/// would stay there.
-const FIRST: [f64; 2] = [0.3, 0.02];
-
-/// Largest half step of a start coordinate, in standard deviations of its range.
-const START_REACH: f64 = 0.5;
+/// It is wider than what most episodes leave of the prior, as an identifier's first region is. In a
+/// region that is too narrow the simulator may be smooth by chance, and the following regions would
+/// stay there.
+const FIRST: f64 = 0.3;
 
 /// Expected posterior standard deviation of each unknown after each control step of an episode.
 ///
@@ -71,43 +71,40 @@ pub fn expected_deviation(
     start: &[f64],
     actions: &[f64],
 ) -> Result<Option<Vec<Vec<f64>>>> {
-    let mut episode = Episode::new(problem, theta, start, actions)?;
+    let Some(mut episode) = Episode::new(problem, theta, start, actions)? else {
+        return Ok(None);
+    };
     let (d, n) = (episode.sought.len(), episode.dimension());
     if d == 0 {
         return Ok(None);
     }
     let mut rng = problem.streams.stream("expected deviation");
-    let (low, high) = episode.bounds();
-    let mut factor = DMatrix::from_fn(n, n, |i, j| {
-        f64::from(u8::from(i == j)) * FIRST[usize::from(i >= d)]
-    });
+    let bound = Parameter::scaled_bound();
+    let (low, high) = (vec![-bound; n], vec![bound; n]);
+    let mut factor = DMatrix::identity(n, n) * FIRST;
     let middle = episode.middle.clone();
     let mut fit = None;
     for _ in 0..settings.rounds.max(1) {
         let points = design(&middle, &factor, (&low, &high), sets(n), &mut rng);
-        let Some(found) = episode.fit(&factor, &points, settings.assumes.tracker)? else {
+        let Some(found) = episode.fit(&factor, &points, settings)? else {
             return Ok(None);
         };
         let Some(told) = found.emulated(settings.assumes.correlated) else {
             return Ok(None);
         };
-        let covariance = inverse_above_prior(&(told + DMatrix::identity(n, n)));
         fit = Some(found);
+        let Some(limits) = within_reach(&factor) else {
+            return Ok(None);
+        };
+        let covariance = inverse_above_prior(&(told + limits));
         let Some(root) = covariance.cholesky() else {
             break;
         };
         // With this length, n pairs have the covariance of the region.
         factor = root.l() * (settings.widen * (n as f64).sqrt());
-        for i in 0..n {
-            let most = if i < d {
-                Parameter::scaled_bound()
-            } else {
-                START_REACH
-            };
-            let length = factor.row(i).norm();
-            if length > most {
-                factor.row_mut(i).scale_mut(most / length);
-            }
+        for mut row in factor.row_iter_mut() {
+            let length = row.norm();
+            row.scale_mut(bound / length.max(bound));
         }
     }
     let Some(fit) = fit else { return Ok(None) };
@@ -127,13 +124,32 @@ pub fn expected_deviation(
     Ok(Some(out))
 }
 
-/// An episode simulated around a point: unknowns in prior-scaled coordinates, then the start pose
-/// in standard deviations of its range.
+/// Information of the prior and of the region with this factor, in prior standard deviations.
+///
+/// The draws of an identifier stay within [`REACH`] standard deviations of the region.
+fn within_reach(factor: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = factor.nrows();
+    let inverse = factor.solve_lower_triangular(&DMatrix::identity(n, n))?;
+    // The factor is `sqrt(n)` standard deviations long. A uniform density over `REACH` of them to
+    // either side has `REACH^2 / 3` times their variance.
+    let limits = inverse.tr_mul(&inverse) * (n as f64 * 3.0 / REACH.powi(2));
+    Some(DMatrix::identity(n, n) + limits)
+}
+
+/// An episode simulated around a point: unknowns in prior-scaled coordinates, then the offset of the
+/// start pose.
+///
+/// As in an identifier, the start pose lies within [`START_BOUND`] standard deviations of what one
+/// reading shows. Offsets are in standard deviations of a uniform density over that range, so that
+/// they have the same bounds as the unknowns.
 struct Episode<'a> {
     problem: &'a Problem<'a>,
     /// Indices of the unknowns that are not binary.
     sought: Vec<usize>,
     theta: Vec<f64>,
+    start: Vec<f64>,
+    /// Unit of the offset of each start coordinate.
+    start_std: Vec<f64>,
     middle: Vec<f64>,
     ctrl: Vec<f64>,
     batch: Batch,
@@ -141,7 +157,12 @@ struct Episode<'a> {
     signals: SignalSet,
     substeps: usize,
     sims: Vec<usize>,
+    /// Pairs of all fits so far: their points and what these read.
+    pairs: Vec<[Simulated; 2]>,
 }
+
+/// A point and its residuals relative to the middle's; `None` where the simulation diverged.
+type Simulated = (Vec<f64>, Option<Vec<f64>>);
 
 impl<'a> Episode<'a> {
     fn new(
@@ -149,7 +170,7 @@ impl<'a> Episode<'a> {
         theta: &[f64],
         start: &[f64],
         actions: &[f64],
-    ) -> Result<Self> {
+    ) -> Result<Option<Self>> {
         let protocol = problem.task.exploration();
         let layout = problem.model.layout();
         let sought: Vec<usize> = (0..theta.len())
@@ -159,10 +180,9 @@ impl<'a> Episode<'a> {
             .iter()
             .map(|&i| problem.parameters[i].to_scaled(theta[i]));
         let bound = Parameter::scaled_bound();
-        let coordinates = start.iter().zip(&protocol.start);
         let middle: Vec<f64> = unknowns
             .map(|z| z.clamp(-bound, bound))
-            .chain(coordinates.map(|(x, c)| x / c.std()))
+            .chain(start.iter().map(|_| 0.0))
             .collect();
         let mut commander = problem.task.commander()?;
         commander.reset();
@@ -174,40 +194,45 @@ impl<'a> Episode<'a> {
         }
         let n = middle.len();
         let size = 1 + 2 * n * sets(n);
-        Ok(Self {
+        let signals = SignalSet::new(layout, problem.signals)?.with_angles_of(
+            problem.task.scene(),
+            layout,
+            problem.signals,
+        )?;
+        let recording = layout.recording(&protocol.channels())?;
+        let mut batch = problem.batch(size)?;
+        let mut first = vec![0.0; recording.width()];
+        batch.set_parameters(&[0], theta)?;
+        batch.place(problem.task, &[0], start)?;
+        batch.simulator.read(&[0], &recording, &mut first)?;
+        // The tracked signals come first in a row.
+        first.truncate(signals.width());
+        if first.iter().any(|x| !x.is_finite()) {
+            return Ok(None);
+        }
+        let mut start_std = start_deviation(problem, &signals, &first);
+        for std in &mut start_std {
+            *std *= START_BOUND / bound;
+        }
+        Ok(Some(Self {
             sought,
             theta: theta.to_vec(),
+            start: start.to_vec(),
+            start_std,
             middle,
             ctrl,
-            batch: problem.batch(size)?,
-            recording: layout.recording(&protocol.channels())?,
-            signals: SignalSet::new(layout, problem.signals)?.with_angles_of(
-                problem.task.scene(),
-                layout,
-                problem.signals,
-            )?,
+            batch,
+            recording,
+            signals,
             substeps: substeps(layout, protocol.frame_period)?,
             sims: (0..size).collect(),
+            pairs: Vec::new(),
             problem,
-        })
+        }))
     }
 
     fn dimension(&self) -> usize {
         self.middle.len()
-    }
-
-    fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
-        let d = self.sought.len();
-        let high: Vec<f64> = (0..self.dimension())
-            .map(|i| {
-                if i < d {
-                    Parameter::scaled_bound()
-                } else {
-                    f64::INFINITY
-                }
-            })
-            .collect();
-        (high.iter().map(|x| -x).collect(), high)
     }
 
     /// Number of residual entries after `steps` control steps; the first reading is that of the
@@ -217,14 +242,15 @@ impl<'a> Episode<'a> {
         (1 + frames) * self.signals.whitened_len()
     }
 
-    /// Simulates the middle and `points`, and fits their differences.
+    /// Simulates the middle and `points`, and fits their differences, together with those of earlier
+    /// fits that lie within the region of `factor`.
     ///
     /// The middle's readings determine how systematic errors of the trackers would show.
     fn fit(
         &mut self,
         factor: &DMatrix<f64>,
         points: &[Vec<f64>],
-        tracker: TrackerPrior,
+        settings: &ExpectedSettings,
     ) -> Result<Option<LocalFit>> {
         let protocol = self.problem.task.exploration();
         let d = self.sought.len();
@@ -235,8 +261,9 @@ impl<'a> Episode<'a> {
                 values[i] = self.problem.parameters[i].from_scaled(*z);
             }
             theta.extend(values);
-            let coordinates = point[d..].iter().zip(&protocol.start);
-            starts.extend(coordinates.map(|(x, c)| x * c.std()));
+            let offsets = point[d..].iter().zip(&self.start_std);
+            let offsets = offsets.map(|(x, std)| x * std);
+            starts.extend(self.start.iter().zip(offsets).map(|(x, offset)| x + offset));
         }
         self.batch.set_parameters(&self.sims, &theta)?;
         self.batch.place(self.problem.task, &self.sims, &starts)?;
@@ -270,7 +297,7 @@ impl<'a> Episode<'a> {
         let time: Vec<f64> = (0..=frames)
             .map(|k| k as f64 * protocol.frame_period)
             .collect();
-        let systematic = SystematicErrors::at(tracker, &self.signals, &time, &all);
+        let systematic = SystematicErrors::at(settings.assumes.tracker, &self.signals, &time, &all);
         // A slow tracker has no reading in some frames.
         let read = ReadingFrames::of(self.problem.task, protocol.frame_period);
         let is_read = (0..=frames).map(|frame| read.has(frame));
@@ -288,8 +315,24 @@ impl<'a> Episode<'a> {
             out.iter().all(|x| x.is_finite()).then_some(out)
         };
         let Some(middle) = of(0) else { return Ok(None) };
-        let rows: Vec<Option<Vec<f64>>> = (1..self.sims.len()).map(of).collect();
-        Ok(LocalFit::new(&self.middle, &middle, factor, points, &rows))
+        let mut simulated = points.iter().cloned().zip((1..self.sims.len()).map(of));
+        let mut fresh = Vec::with_capacity(points.len() / 2);
+        while let (Some(up), Some(down)) = (simulated.next(), simulated.next()) {
+            fresh.push([up, down]);
+        }
+        let n = self.middle.len();
+        // The factor is `sqrt(n)` standard deviations of the region long.
+        let reach = REACH / (n as f64).sqrt();
+        let within = |point: &[f64]| {
+            let step = DVector::from_fn(n, |i, _| point[i] - self.middle[i]);
+            let step = factor.solve_lower_triangular(&step);
+            step.is_some_and(|u| u.amax() <= reach)
+        };
+        let near = |pair: &&[Simulated; 2]| pair.iter().all(|(point, _)| within(point));
+        let used = self.pairs.iter().filter(near).chain(&fresh).flatten();
+        let (points, rows): (Vec<_>, Vec<_>) = used.cloned().unzip();
+        self.pairs.extend(fresh);
+        Ok(LocalFit::new(&self.middle, &middle, factor, &points, &rows))
     }
 
     fn deviations(&self, theta: &[f64], covariance: &DMatrix<f64>) -> Vec<f64> {
