@@ -7,8 +7,7 @@
 //!
 //! This module uses the noise model of identification: slopes and roughness from a [`LocalFit`].
 //! As in an identifier, the region of the fit follows that of the posterior from round to round, the
-//! simulations of earlier rounds are used again, and the start pose is as uncertain as one reading
-//! of the trackers.
+//! simulations of earlier rounds are used again, and the start pose is known only by the readings.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -60,7 +59,8 @@ const FIRST: f64 = 0.3;
 ///
 /// The episode plays `actions` (`horizon x action`) at `theta` and `start`. The result has `horizon
 /// + 1` rows, in the unknowns' units; the first holds the prior standard deviations. Binary
-/// unknowns have no slope: their entries are NaN. `None` where nearly every simulation diverged.
+/// unknowns have no slope: their entries are NaN. `None` where nearly every simulation diverged, the
+/// start has no reading, or all unknowns are binary.
 ///
 /// # Errors
 /// When the engine fails.
@@ -93,13 +93,9 @@ pub fn expected_deviation(
             return Ok(None);
         };
         fit = Some(found);
-        let Some(limits) = within_reach(&factor) else {
-            return Ok(None);
-        };
-        let covariance = inverse_above_prior(&(told + limits));
-        let Some(root) = covariance.cholesky() else {
-            break;
-        };
+        let next = within_reach(&factor)
+            .and_then(|limits| inverse_above_prior(&(told + limits)).cholesky());
+        let Some(root) = next else { break };
         // With this length, n pairs have the covariance of the region.
         factor = root.l() * (settings.widen * (n as f64).sqrt());
         for mut row in factor.row_iter_mut() {
@@ -184,6 +180,10 @@ impl<'a> Episode<'a> {
             .map(|z| z.clamp(-bound, bound))
             .chain(start.iter().map(|_| 0.0))
             .collect();
+        let mut inside = theta.to_vec();
+        for (&i, z) in sought.iter().zip(&middle) {
+            inside[i] = problem.parameters[i].from_scaled(*z);
+        }
         let mut commander = problem.task.commander()?;
         commander.reset();
         let block = protocol.frames_per_step * layout.nu();
@@ -202,7 +202,7 @@ impl<'a> Episode<'a> {
         let recording = layout.recording(&protocol.channels())?;
         let mut batch = problem.batch(size)?;
         let mut first = vec![0.0; recording.width()];
-        batch.set_parameters(&[0], theta)?;
+        batch.set_parameters(&[0], &inside)?;
         batch.place(problem.task, &[0], start)?;
         batch.simulator.read(&[0], &recording, &mut first)?;
         // The tracked signals come first in a row.
@@ -216,7 +216,7 @@ impl<'a> Episode<'a> {
         }
         Ok(Some(Self {
             sought,
-            theta: theta.to_vec(),
+            theta: inside,
             start: start.to_vec(),
             start_std,
             middle,
@@ -342,5 +342,19 @@ impl<'a> Episode<'a> {
             out[i] = self.problem.parameters[i].unscale_std(theta[i], scaled);
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_region_adds_the_information_of_its_limits_to_the_prior() {
+        // A region of half a prior standard deviation: 1 + 3 / (3 * 0.5)^2.
+        let factor = DMatrix::identity(3, 3) * (0.5 * 3.0_f64.sqrt());
+        let limits = within_reach(&factor).unwrap();
+        let expected = DMatrix::identity(3, 3) * (1.0 + 3.0 / 2.25);
+        assert!((limits - expected).norm() < 1e-12);
     }
 }

@@ -148,6 +148,12 @@ impl<'a> Likelihood<'a> {
         self.size
     }
 
+    /// Number of episodes.
+    #[must_use]
+    pub fn episodes(&self) -> usize {
+        self.episodes.len()
+    }
+
     /// Holds some unknowns at a value; they are then no entries of a point.
     pub fn hold(&mut self, values: &[Option<f64>]) {
         self.fixed.copy_from_slice(values);

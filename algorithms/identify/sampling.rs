@@ -23,23 +23,16 @@ use crate::optimise::{Gaussian, require};
 /// the region, and no measure of its true width.
 const OUTSIDE: f64 = 2.0;
 
-/// Standard deviation of a posterior along any direction, in standard deviations of the
-/// region, above which the region is too narrow.
-///
-/// The posterior is then cut by the region ([`REACH`]), and its width is that of the region. A
-/// region that is as wide as it should be has twice the width of the posterior
-/// ([`SamplingSettings::widen`]).
-const CUT: f64 = 1.0;
-
-/// Maximum number of rounds, in multiples of those of the settings: a round that only moves the
-/// or widens the region does not count as one of these.
+/// Maximum number of rounds, in multiples of those of the settings: a round whose region was too
+/// narrow, or lay beside the posterior, does not count as one of these.
 const PATIENCE: usize = 3;
 
 /// How the posterior is sampled after the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SamplingSettings {
-    /// Rounds of draws.
+    /// Rounds of draws, at least; up to three times as many where the region of a round cuts the
+    /// posterior.
     pub rounds: usize,
     /// Draws per round; at least three per feature of the emulator are taken.
     pub draws: usize,
@@ -178,13 +171,18 @@ pub fn summary(
 }
 
 /// The region that follows a posterior, and whether the posterior has its own width and not that of
-/// the region which it was drawn in.
+/// the region in which it was drawn.
+///
+/// In standard deviations of the region, a posterior has the width `1 / widen` in a region as wide
+/// as it should be. One that fills the region is uniform over [`REACH`] to either side, and has the
+/// width `REACH / sqrt(3)`. The limit between the two is their geometric mean.
 fn next_region(region: &Gaussian, posterior: &Gaussian, widen: f64) -> (Gaussian, bool) {
     let off = region.standardise(posterior.mean());
     if off.iter().any(|u| u.abs() > OUTSIDE) {
         return (region.moved_to(posterior.mean()), false);
     }
-    let settled = region.largest_ratio(posterior) <= CUT;
+    let cut = (REACH / 3.0_f64.sqrt() / widen).sqrt();
+    let settled = region.widest_axis(posterior) <= cut;
     (posterior.widened(widen), settled)
 }
 
@@ -268,10 +266,11 @@ pub fn posterior(
         loss: 0.5 * emulator.residual.powi(2) * likelihood.present() as f64,
         narrowing: widths.sum(),
     };
-    let episodes = (n - d) / problem.task.exploration().start.len().max(1);
     let identified = Identified {
         posterior: Posterior::from_samples(problem.parameters, values, &vec![1.0; drawn.len()]),
-        starts: (0..episodes).map(|k| likelihood.start(&best, k)).collect(),
+        starts: (0..likelihood.episodes())
+            .map(|k| likelihood.start(&best, k))
+            .collect(),
         iterations,
         residual: emulator.residual,
         misfit: Some(emulator.misfit),
@@ -283,6 +282,10 @@ pub fn posterior(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use asid_core::Streams;
+    use nalgebra::DMatrix;
+
+    use crate::identify::walk::Walk;
 
     fn normal(mean: [f64; 2], std: [f64; 2]) -> Gaussian {
         Gaussian::diagonal(&mean, &std, &[-99.0; 2], &[99.0; 2])
@@ -301,6 +304,29 @@ mod tests {
         let (next, settled) = next_region(&next, &normal([0.1; 2], [0.1, 1.7]), 2.0);
         assert!(settled);
         assert_eq!(next.std(), [0.2, 3.4]);
+    }
+
+    /// Symptom: with eight episodes hardly any round counted. Cause: the largest ratio of two sample
+    /// covariances grows with the number of entries.
+    #[test]
+    fn rounds_of_a_normal_posterior_count_with_many_episodes() {
+        for n in [3, 19, 27] {
+            let walk = Walk {
+                shape: DMatrix::identity(n, n),
+                inside: &|_| true,
+                loss: &|u: &[f64]| 0.5 * u.iter().map(|x| x * x).sum::<f64>(),
+            };
+            let fitted = |seed| {
+                let mut rng = Streams::new(seed).stream("walk");
+                let drawn = walk.draws(&vec![0.0; n], 1000, &mut rng);
+                let (low, high) = (vec![-99.0; n], vec![99.0; n]);
+                Gaussian::fit(&drawn, &vec![1.0; 1000], &vec![0.0; n], &low, &high).unwrap()
+            };
+            for seed in 0..5 {
+                let region = fitted(2 * seed).widened(2.0);
+                assert!(next_region(&region, &fitted(2 * seed + 1), 2.0).1, "{n}");
+            }
+        }
     }
 
     #[test]

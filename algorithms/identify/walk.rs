@@ -10,11 +10,13 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Steps before the first draw is kept: each walker has then moved some sixty times, and forgotten
-/// where it began.
-const WARM_UP: usize = 2000;
-/// Steps between two kept draws, since neighbouring states of a walker are correlated. A prime, so
-/// that all walkers come up.
+/// Moves of each walker before the first draw is kept, for each entry of a point. The correlation
+/// of a walker's states lasts for a number of moves in proportion to the entries; after this many it
+/// has forgotten where it began.
+const WARM_UP: usize = 12;
+/// Steps of the ensemble between two kept draws, since neighbouring states of a walker are
+/// correlated: `2 n + 1` for `n` entries, and at least this many. Both are odd and have no divisor
+/// in common with the number of walkers, so that all walkers come up.
 const THIN: usize = 11;
 /// Fewest walkers. With twice as many as entries they span all directions; more mix better.
 const WALKERS: usize = 32;
@@ -43,7 +45,8 @@ impl Walk<'_> {
         let mut loss: Vec<f64> = at.iter().map(|u| (self.loss)(u)).collect();
         let mut out = Vec::with_capacity(count);
         let mut next = vec![0.0; n];
-        for i in 0..WARM_UP + count * THIN {
+        let (warm_up, thin) = (WARM_UP * n * walkers, THIN.max(2 * n + 1));
+        for i in 0..warm_up + count * thin {
             let k = i % walkers;
             let other = (k + rng.random_range(1..walkers)) % walkers;
             // The density of the factor z is 1 / sqrt(z) between the limits.
@@ -60,7 +63,7 @@ impl Walk<'_> {
                     loss[k] = ahead;
                 }
             }
-            if i >= WARM_UP && (i - WARM_UP).is_multiple_of(THIN) {
+            if i >= warm_up && (i - warm_up).is_multiple_of(thin) {
                 out.push(at[k].clone());
             }
         }

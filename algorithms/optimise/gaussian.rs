@@ -162,12 +162,13 @@ impl Gaussian {
         (0..self.mean.len()).map(|i| l.row(i).norm()).collect()
     }
 
-    /// The largest standard deviation of another distribution along any direction, in standard
-    /// deviations of this one.
+    /// The largest standard deviation of another distribution along an axis of the coordinates in
+    /// which this one is a standard normal one.
     #[must_use]
-    pub fn largest_ratio(&self, other: &Self) -> f64 {
+    pub fn widest_axis(&self, other: &Self) -> f64 {
         let ratio = self.factor.solve_lower_triangular(&other.factor);
-        ratio.map_or(f64::INFINITY, |ratio| ratio.singular_values().max())
+        let widths = ratio.iter().flat_map(|ratio| ratio.row_iter());
+        widths.map(|row| row.norm()).fold(0.0, f64::max)
     }
 
     /// Coordinates of `x` in which the distribution is a standard normal one.
@@ -256,15 +257,15 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_ratio_is_that_of_the_worst_direction() {
+    fn the_widest_axis_is_that_of_standardised_coordinates() {
         let of = |covariance: [f64; 4]| {
             let covariance = DMatrix::from_row_slice(2, 2, &covariance);
             Gaussian::new(DVector::zeros(2), covariance, &[-9.0; 2], &[9.0; 2]).unwrap()
         };
-        // Variance 1.8 along the sum and 0.2 along the difference, against 1 and 1.
-        let (round, tilted) = (of([1.0, 0.0, 0.0, 1.0]), of([1.0, 0.8, 0.8, 1.0]));
-        assert!((round.largest_ratio(&tilted) - 1.8_f64.sqrt()).abs() < 1e-12);
-        assert!((tilted.largest_ratio(&round) - 0.2_f64.sqrt().recip()).abs() < 1e-12);
+        let (round, tilted) = (of([1.0, 0.0, 0.0, 1.0]), of([4.0, 1.0, 1.0, 0.5]));
+        assert!((round.widest_axis(&tilted) - 2.0).abs() < 1e-12);
+        // L = [[2, 0], [0.5, 0.5]], so that L^-1 = [[0.5, 0], [-0.5, 2]].
+        assert!((tilted.widest_axis(&round) - 4.25_f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]
