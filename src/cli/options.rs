@@ -41,7 +41,8 @@ pub fn count(text: &str) -> Result<u64, String> {
 /// Options of every subcommand that works.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Common {
-    /// Simulate with this engine: see `asid list`
+    /// Simulate with this engine: see `asid list` [default: for a task rapier, for a study or a model
+    /// of your own MuJoCo, where they are built in]
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
     /// Seed all random numbers with this
