@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use asid_algorithms::fisher::{FisherBatch, FisherSettings, Form};
 use asid_algorithms::identify::expected::{ExpectedSettings, expected_deviation};
+use asid_core::Model;
 use asid_core::error::Result;
 use asid_core::explore::{CurvePoint, Explorer};
 use asid_core::identify::{Identified, Identifier};
@@ -153,11 +154,23 @@ pub struct Method<'m> {
     pub identifier: Option<&'m dyn Identifier>,
     /// How to solve.
     pub solver: &'m dyn TaskSolver,
+    /// The models that share the simulations of the identifier, where errors of the simulator are
+    /// taken into account.
+    pub ensemble: Option<&'m dyn Model>,
     /// Values of the unknowns that the solver is given where nothing is identified.
     pub known: Option<&'m [f64]>,
     /// How the expected deviations are computed. The identifier decides whether readings are
     /// weighted jointly.
     pub expected: ExpectedSettings,
+}
+
+/// The problem with its simulations in other models, if there are any.
+#[must_use]
+pub fn simulated_in<'a>(problem: &Problem<'a>, models: Option<&'a dyn Model>) -> Problem<'a> {
+    Problem {
+        model: models.unwrap_or(problem.model),
+        ..problem.clone()
+    }
 }
 
 /// Explore, identify, solve and attempt.
@@ -191,7 +204,8 @@ pub fn run(
 
     let mut identified = None;
     if let (Some(identifier), Some(real)) = (method.identifier, &real) {
-        identified = Some(identifier.identify(problem, std::slice::from_ref(&real.episode))?);
+        let problem = simulated_in(problem, method.ensemble);
+        identified = Some(identifier.identify(&problem, std::slice::from_ref(&real.episode))?);
         costs.push(clock.lap("identify"));
     }
     let belief = match (&identified, method.known) {

@@ -58,6 +58,7 @@ fn run(name: &str, seed: u64) -> [f64; 2] {
             explorer: explorer.as_deref(),
             identifier: identifier.as_deref(),
             solver: &*solver,
+            ensemble: None,
             known: None,
             expected: ExpectedSettings::default(),
         };

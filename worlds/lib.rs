@@ -13,18 +13,25 @@
 //! Three modules make a perturbed world: `ranges` defines how far off it may be, `drawn` holds the
 //! values drawn by its seed, and `applied` applies them to a scene.
 //!
+//! [`ModelErrors`] uses the same perturbations for the method's simulator: an [`Ensemble`] of models
+//! that differ in what their maker does not know.
+//!
 //! Each world has its own random streams, which no part of a method can reach.
 
 mod applied;
 mod crossed;
 mod drawn;
+mod ensemble;
 mod kind;
+mod model_errors;
 mod ranges;
 mod simulated;
 
 pub use applied::{Perturbed, perturb};
 pub use crossed::other_engine;
 pub use drawn::{Perturbation, TrackerPerturbation};
+pub use ensemble::Ensemble;
 pub use kind::WorldKind;
+pub use model_errors::{MODEL_ERRORS, ModelErrors};
 pub use ranges::PerturbationRanges;
 pub use simulated::{SimulatedWorld, TrackerErrors};

@@ -99,14 +99,18 @@ impl PerturbationRanges {
     /// [`Error::Config`] naming the key.
     pub fn read(table: &toml::Table) -> Result<Self> {
         let ranges: Self = asid_core::registry::settings(SECTION, table)?;
-        ranges.check()?;
+        ranges.check(SECTION)?;
         Ok(ranges)
     }
 
-    fn check(&self) -> Result<()> {
+    /// Checks the ranges of a section.
+    ///
+    /// # Errors
+    /// [`Error::Config`] naming the key.
+    pub(crate) fn check(&self, section: &str) -> Result<()> {
         let wrong = |key: &str, message: String| {
             Err(Error::Config {
-                key: format!("{SECTION}.{key}"),
+                key: format!("{section}.{key}"),
                 message,
             })
         };
@@ -172,6 +176,6 @@ mod tests {
                 .to_string();
             assert!(error.contains(key), "{text}: {error}");
         }
-        assert!(PerturbationRanges::off().check().is_ok());
+        assert!(PerturbationRanges::off().check(SECTION).is_ok());
     }
 }

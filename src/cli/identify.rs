@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::pipeline::simulated_in;
 use anyhow::Result;
 use asid_algorithms::identify::articulation::Articulation;
 use asid_core::identify::Identified;
 use asid_core::posterior::Direction;
 use asid_core::registry::{IdentifierEntry, find};
-use asid_core::{Episode, Error, Parameter};
+use asid_core::{Episode, Error, Model, Parameter};
 use asid_report::run::{RealWorld, RunReport};
 use serde::Serialize;
 
@@ -143,7 +144,9 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     let config = &session.config;
     let identifier =
         (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
-    let found = identifier.identify(&session.problem(), &episodes)?;
+    let ensemble = session.ensemble()?;
+    let models = ensemble.as_ref().map(|e| e as &dyn Model);
+    let found = identifier.identify(&simulated_in(&session.problem(), models), &episodes)?;
 
     let wall_s = clock.elapsed().as_secs_f64();
     let coordinates = &session.task.exploration().start;

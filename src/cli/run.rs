@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use crate::pipeline::{self, Method, RunOutcome};
 use anyhow::Result;
+use asid_core::Model;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Worlds};
@@ -121,10 +122,12 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
     let identifier =
         (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
     let solver = (find::<SolverEntry>(&config.solver.name)?.make)(&config.solver.settings)?;
+    let ensemble = session.ensemble()?;
     let method = Method {
         explorer: Some(&*explorer),
         identifier: Some(&*identifier),
         solver: &*solver,
+        ensemble: ensemble.as_ref().map(|e| e as &dyn Model),
         known: None,
         expected: config.expected.settings(),
     };

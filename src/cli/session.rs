@@ -7,7 +7,8 @@ use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
 use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Streams, Task};
-use asid_worlds::{SimulatedWorld, TrackerErrors};
+use asid_effects::refined_model::RefinedModel;
+use asid_worlds::{Ensemble, SimulatedWorld, TrackerErrors};
 
 use super::failure;
 use super::model::{self, Needs};
@@ -27,6 +28,8 @@ pub struct Session {
     real: World,
     /// The simulator of the method.
     pub model: Arc<dyn Model>,
+    /// Its refined model, where it was given as such and not as a file.
+    refined: Option<RefinedModel>,
     pub engine: String,
     capabilities: Capabilities,
     threads: usize,
@@ -104,6 +107,7 @@ impl Session {
                 perturbed: None,
             },
             model,
+            refined: worlds.simulator.refined.clone(),
             engine: format!("{} {}", backend.name(), backend.version()),
             capabilities: backend.capabilities(),
             threads: common.threads.unwrap_or(0),
@@ -132,6 +136,30 @@ impl Session {
             physics_counter: &self.physics_steps,
             env_counter: &self.env_steps,
         }
+    }
+
+    /// Compiles the models in which the method identifies: its simulator with errors that are drawn
+    /// by the seed. `None` where the simulator is taken as it is.
+    pub fn ensemble(&self) -> Result<Option<Ensemble>> {
+        let config = &self.config;
+        let errors = config.model_errors;
+        if errors.members == 0 {
+            return Ok(None);
+        }
+        let source = match (&self.refined, &config.model) {
+            (Some(source), _) => source.clone(),
+            (None, Some(path)) => RefinedModel::open(path)?,
+            (None, None) => model::of_task(&*self.task),
+        };
+        let backend = backend(&config.backend)?;
+        let given = (&source.parameters[..], &source.effects[..]);
+        let streams = Streams::new(config.seed).sealed("model errors");
+        let made = errors.ensemble(&*backend, &source.scene, given, &self.parameters, streams)?;
+        let (ensemble, left_out) = made.unzip();
+        for part in left_out.into_iter().flatten() {
+            failure::warn(&format!("model_errors leaves out {part}"));
+        }
+        Ok(ensemble)
     }
 
     /// Random streams of the real world, which cannot be derived from those of the method.

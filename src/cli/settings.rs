@@ -10,6 +10,7 @@ use asid_core::task::Condition;
 use asid_core::{Error, Parameter, Task, registry};
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
+use asid_worlds::{MODEL_ERRORS, ModelErrors};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -72,6 +73,9 @@ pub struct Config {
     pub solver: Component,
     /// How the expected deviations of a run are computed.
     pub expected: ExpectedConfig,
+    /// Errors of the simulator that identification takes into account.
+    #[serde(skip_serializing_if = "is_exact")]
+    pub model_errors: ModelErrors,
     /// Real world.
     pub real: RealConfig,
     /// How hard the task is, by name.
@@ -84,7 +88,7 @@ pub struct Config {
 }
 
 /// Keys at the top of a configuration.
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 19] = [
     "schema",
     "command",
     "task",
@@ -98,6 +102,7 @@ const KEYS: [&str; 18] = [
     "identifier",
     "solver",
     "expected",
+    MODEL_ERRORS,
     "real",
     "preset",
     "difficulty",
@@ -212,6 +217,7 @@ impl Config {
                 ASID.solver,
             )?,
             expected: ExpectedConfig::of(&table)?,
+            model_errors: ModelErrors::read(&section(&table, MODEL_ERRORS)?)?,
             real,
             difficulty: difficulty::levels(task, common)?,
             noise: noise(task, &section(&table, "noise")?)?,
@@ -257,6 +263,11 @@ impl Config {
         }
         recorded(used(&files))
     }
+}
+
+/// Whether the simulator is taken as it is.
+fn is_exact(errors: &ModelErrors) -> bool {
+    *errors == ModelErrors::default()
 }
 
 /// The explorer, with the file of `--policy`.

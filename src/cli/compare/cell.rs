@@ -5,6 +5,7 @@ use std::time::Instant;
 use crate::pipeline::{self, Method as Parts};
 use anyhow::Result;
 use asid_comparison::cell::{Cell, CellKey, CellParameter, SCHEMA, Versions};
+use asid_core::Model;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::arm::Arm;
@@ -53,6 +54,10 @@ pub fn run(arm: &Arm, key: &CellKey) -> Result<(Cell, f64)> {
             (find::<IdentifierEntry>(&component.name)?.make)(&component.settings)
         })
         .transpose()?;
+    let ensemble = match &identifier {
+        Some(_) => session.ensemble()?,
+        None => None,
+    };
     let solver = (find::<SolverEntry>(&config.solver.name)?.make)(&config.solver.settings)?;
     let truth = session.truth();
     let problem = session.problem();
@@ -61,6 +66,7 @@ pub fn run(arm: &Arm, key: &CellKey) -> Result<(Cell, f64)> {
         explorer: explorer.as_deref(),
         identifier: identifier.as_deref(),
         solver: &*solver,
+        ensemble: ensemble.as_ref().map(|e| e as &dyn Model),
         known: method.knows_the_truth().then_some(&*truth),
         expected: config.expected.settings(),
     };
