@@ -57,10 +57,10 @@ const FIRST: f64 = 0.3;
 
 /// Expected posterior standard deviation of each unknown after each control step of an episode.
 ///
-/// The episode plays `actions` (`horizon x action`) at `theta` and `start`. The result has `horizon
-/// + 1` rows, in the unknowns' units; the first holds the prior standard deviations. Binary
-/// unknowns have no slope: their entries are NaN. `None` where nearly every simulation diverged, the
-/// start has no reading, or all unknowns are binary.
+/// The episode plays `actions` (`horizon x action`) at `theta` and `start`. The result has a row for
+/// the start, which holds the prior standard deviations, and one for each control step, in the
+/// unknowns' units. Binary unknowns have no slope: their entries are NaN. `None` where nearly every
+/// simulation diverged, the start has no reading, or all unknowns are binary.
 ///
 /// # Errors
 /// When the engine fails.

@@ -95,6 +95,16 @@ pub struct IdentifyResult {
     versions: Versions,
 }
 
+/// Fits the unknowns to the episodes, in the models that the settings ask for.
+fn fitted(session: &Session, episodes: &[Episode]) -> Result<Identified> {
+    let component = &session.config.identifier;
+    let identifier = (find::<IdentifierEntry>(&component.name)?.make)(&component.settings)?;
+    let ensemble = session.ensemble()?;
+    let models = ensemble.as_ref().map(|e| e as &dyn Model);
+    let problem = session.problem();
+    Ok(identifier.identify(&simulated_in(&problem, models), episodes)?)
+}
+
 /// Identifies from logs.
 pub fn identify(arguments: &Arguments) -> Result<()> {
     let clock = Instant::now();
@@ -142,11 +152,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     )?;
     interrupt::watch(&format!("the identification of {}", arguments.task))?;
     let config = &session.config;
-    let identifier =
-        (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
-    let ensemble = session.ensemble()?;
-    let models = ensemble.as_ref().map(|e| e as &dyn Model);
-    let found = identifier.identify(&simulated_in(&session.problem(), models), &episodes)?;
+    let found = fitted(&session, &episodes)?;
 
     let wall_s = clock.elapsed().as_secs_f64();
     let coordinates = &session.task.exploration().start;

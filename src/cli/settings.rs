@@ -74,7 +74,6 @@ pub struct Config {
     /// How the expected deviations of a run are computed.
     pub expected: ExpectedConfig,
     /// Errors of the simulator that identification takes into account.
-    #[serde(skip_serializing_if = "is_exact")]
     pub model_errors: ModelErrors,
     /// Real world.
     pub real: RealConfig,
@@ -263,11 +262,6 @@ impl Config {
         }
         recorded(used(&files))
     }
-}
-
-/// Whether the simulator is taken as it is.
-fn is_exact(errors: &ModelErrors) -> bool {
-    *errors == ModelErrors::default()
 }
 
 /// The explorer, with the file of `--policy`.
