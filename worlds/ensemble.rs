@@ -153,6 +153,23 @@ impl Shared {
         }
     }
 
+    /// Gives each member its simulations' positions and velocities by `set`.
+    fn put(
+        &mut self,
+        sims: &[usize],
+        (qpos, qvel): (&[f64], &[f64]),
+        set: impl Fn(&mut dyn Simulator, &[usize], &[f64], &[f64]) -> Result<()>,
+    ) -> Result<()> {
+        let (nq, nv) = (self.layout().nq, self.layout().nv);
+        check_state(self.layout(), sims.len(), qpos, qvel)?;
+        for part in self.parts(sims)? {
+            let (qpos, qvel) = (part.of(qpos, nq), part.of(qvel, nv));
+            set(&mut *self.members[part.member], &part.sims, &qpos, &qvel)?;
+        }
+        self.look();
+        Ok(())
+    }
+
     /// Pairs of simulations by member; no state goes from one member to another.
     fn pairs(&self, from: &[usize], to: &[usize]) -> Result<Vec<[Vec<usize>; 2]>> {
         let count = self.members.len();
@@ -199,25 +216,15 @@ impl Simulator for Shared {
     }
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
-        let (nq, nv) = (self.layout().nq, self.layout().nv);
-        check_state(self.layout(), sims.len(), qpos, qvel)?;
-        for part in self.parts(sims)? {
-            let (qpos, qvel) = (part.of(qpos, nq), part.of(qvel, nv));
-            self.members[part.member].set_state(&part.sims, &qpos, &qvel)?;
-        }
-        self.look();
-        Ok(())
+        self.put(sims, (qpos, qvel), |member, sims, qpos, qvel| {
+            member.set_state(sims, qpos, qvel)
+        })
     }
 
     fn displace(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
-        let (nq, nv) = (self.layout().nq, self.layout().nv);
-        check_state(self.layout(), sims.len(), qpos, qvel)?;
-        for part in self.parts(sims)? {
-            let (qpos, qvel) = (part.of(qpos, nq), part.of(qvel, nv));
-            self.members[part.member].displace(&part.sims, &qpos, &qvel)?;
-        }
-        self.look();
-        Ok(())
+        self.put(sims, (qpos, qvel), |member, sims, qpos, qvel| {
+            member.displace(sims, qpos, qvel)
+        })
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
