@@ -49,7 +49,7 @@ impl Document {
             .map(Some)
             .map_err(|e: toml::de::Error| Error::Config {
                 key: SECTION.into(),
-                message: e.message().replace('\n', " "),
+                message: toml_text::keyed(&e),
             })
     }
 
@@ -65,7 +65,7 @@ impl Document {
         let text = std::fs::read_to_string(path)
             .map_err(|e| wrong(format!("{e}; is this the folder of a comparison?")))?;
         let mut settings: toml::Table =
-            toml_text::read(&text).map_err(|e| wrong(e.message().to_owned()))?;
+            toml_text::read(&text).map_err(|e| wrong(toml_text::located(&text, &e)))?;
         let plan = Self::plan_of(&mut settings).map_err(|e| wrong(e.to_string()))?;
         let plan = plan.ok_or_else(|| wrong("is not the configuration of a comparison".into()))?;
         Ok(Self { plan, settings })

@@ -56,11 +56,11 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Checks and prepares the logs of a study.
+    /// Leaves out outliers and passes over sensors that never change; the wiring stays as it is.
     ///
     /// # Errors
     /// When the engine fails.
-    pub fn of(study: &Study, machine: &Machine) -> Result<Self> {
+    pub fn as_wired(study: &Study, machine: &Machine) -> Result<Self> {
         let sensors = machine.plant.layout.sensors.iter().map(|s| &*s.name);
         let absent = absent(study, sensors);
         let mut study = study.clone();
@@ -70,7 +70,7 @@ impl Intake {
             outliers::leave_out(&mut logs, &machine.plant.layout)
         };
         let unchanging = pass_over(&mut study, machine)?;
-        let mut intake = Self {
+        Ok(Self {
             study,
             other: None,
             is_mended: false,
@@ -80,7 +80,15 @@ impl Intake {
             left_out,
             absent,
             unchanging,
-        };
+        })
+    }
+
+    /// Checks and prepares the logs of a study.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn of(study: &Study, machine: &Machine) -> Result<Self> {
+        let mut intake = Self::as_wired(study, machine)?;
         if intake.study.wired {
             return Ok(intake);
         }
@@ -147,6 +155,13 @@ impl Intake {
                 result.sentence
             );
         }
+    }
+
+    /// What was skipped or corrected in the logs, apart from their wiring.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let checks = [self.log_check(), self.outlier_check()];
+        checks.into_iter().flatten().map(|c| c.detail).collect()
     }
 
     /// Returns the check of what was skipped or corrected in the logs, unusable sensors first;

@@ -188,6 +188,12 @@ fn dataset_of(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
         head: test.cut(&layout, HEAD),
         test,
     };
+    if !study.test.is_empty() && bench.held_readings() < 1.0 {
+        return Err(Error::Failed(format!(
+            "study {}: the logs held out are too short for a gap: no reading is left behind the first rows, to which their initial states are fitted",
+            study.name
+        )));
+    }
     Ok((bench, nominal))
 }
 

@@ -7,6 +7,8 @@
 use serde::de::{DeserializeOwned, Error as _};
 use toml::de::Error;
 
+use crate::guard::one_line;
+
 /// Maximum number of open brackets: the parser's own limit, which it applies to values only after
 /// it has found them.
 const MAX_LEVELS: usize = 80;
@@ -21,6 +23,34 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
         return Err(Error::custom(message));
     }
     toml::from_str(text)
+}
+
+/// What is wrong with a text, on one line that begins with its line of the text.
+#[must_use]
+pub fn located(text: &str, error: &Error) -> String {
+    let message = one_line(error.message());
+    match error.span() {
+        Some(span) => {
+            let before = text.bytes().take(span.start);
+            let line = before.filter(|&byte| byte == b'\n').count() + 1;
+            format!("line {line}: {message}")
+        }
+        None => message,
+    }
+}
+
+/// What is wrong with a value of a table that was read before, on one line that begins with the keys
+/// that lead to it.
+#[must_use]
+pub fn keyed(error: &Error) -> String {
+    let message = one_line(error.message());
+    // The keys are only in the text that the library displays.
+    let shown = error.to_string();
+    let keys = shown.lines().last().and_then(|l| l.strip_prefix("in `"));
+    match keys.and_then(|keys| keys.strip_suffix('`')) {
+        Some(keys) => format!("`{keys}`: {message}"),
+        None => message,
+    }
 }
 
 /// Maximum number of simultaneously open brackets, outside of strings and comments.
@@ -85,6 +115,26 @@ mod tests {
             let error = read::<toml::Table>(&text).unwrap_err().to_string();
             assert!(error.contains("nested deeper than 80"), "{unit}: {error}");
         }
+    }
+
+    #[test]
+    fn a_fault_names_its_line_or_its_key() {
+        type Limits = std::collections::BTreeMap<String, std::collections::BTreeMap<String, f64>>;
+        let text = "[limit]\nspeed = 1.0\nforce = \"a\"\n";
+        let error = read::<Limits>(text).unwrap_err();
+        assert!(
+            located(text, &error).starts_with("line 3: invalid type"),
+            "{error}"
+        );
+        let table: toml::Table = text.parse().unwrap();
+        let error = table.try_into::<Limits>().unwrap_err();
+        assert!(
+            keyed(&error).starts_with("`limit.force`: invalid type"),
+            "{error}"
+        );
+        let broken = "a = 1\nb = x\n";
+        let error = read::<toml::Table>(broken).unwrap_err();
+        assert!(located(broken, &error).starts_with("line 2: "), "{error}");
     }
 
     #[test]

@@ -108,6 +108,41 @@ pub fn wrong_eulerseq<'a>(
     given.find(|(_, text)| !axes(text))
 }
 
+/// The first number that no machine has, its node, and what is wrong with it: one that is not
+/// finite, a mass or density below zero, a time step of zero or less. Engines compute with some of
+/// these without a word.
+#[must_use]
+pub fn wrong_number<'a>(
+    document: &'a roxmltree::Document<'_>,
+) -> Option<(roxmltree::Node<'a, 'a>, String)> {
+    // A thing may be called `inf`; references to it are no numbers.
+    let named = |text: &str| {
+        let names = document.descendants().filter_map(|n| n.attribute("name"));
+        names
+            .chain(document.descendants().filter_map(|n| n.attribute("class")))
+            .any(|n| n == text)
+    };
+    let wrong = |key: &str, text: &str| {
+        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|x| x.parse().ok()).collect();
+        let numbers = numbers?;
+        if numbers.iter().any(|x| !x.is_finite()) {
+            return (!named(text)).then_some("is not finite");
+        }
+        let below = |least: f64| numbers.iter().any(|x| *x < least);
+        match key {
+            "mass" | "density" if below(0.0) => Some("is below 0"),
+            "timestep" if below(f64::MIN_POSITIVE) => Some("is no positive number of seconds"),
+            _ => None,
+        }
+    };
+    document.descendants().find_map(|node| {
+        node.attributes().find_map(|given| {
+            let (key, text) = (given.name(), given.value());
+            Some((node, format!("{key}=\"{text}\" {}", wrong(key, text)?)))
+        })
+    })
+}
+
 /// The document `xml` with every `<include file="…"/>` replaced.
 ///
 /// The replacement is the children of the root of the file, which `load` reads.

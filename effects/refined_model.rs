@@ -83,8 +83,8 @@ impl RefinedModel {
             })
         })?;
         let document: Document = toml_text::read(&text).map_err(|e| {
-            let message = e.message().split_whitespace().collect::<Vec<_>>().join(" ");
-            fail(format!("is no refined model: {message}"))
+            let fault = toml_text::located(&text, &e);
+            fail(format!("is no refined model: {fault}"))
         })?;
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         let mut base = Self::open_at(&folder.join(&document.model), depth + 1)?;

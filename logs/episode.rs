@@ -25,7 +25,7 @@ use asid_core::{Episode, Error, Result};
 pub use self::parquet::ParquetFile;
 #[cfg(feature = "parquet")]
 pub(crate) use self::parquet::number_in;
-pub use clock::seconds;
+pub use clock::{seconds, stamps_read_as};
 pub use mapping::{ColumnMapping, counts, unit_counts, unit_factor};
 pub use notes::{LogNotes, check_mapped_columns};
 pub use reader::is_of_start;

@@ -1,6 +1,6 @@
 //! Converts a table with any names to a log: finds the column of the stamps.
 
-use crate::episode::seconds;
+use crate::episode::{seconds, stamps_read_as};
 use crate::raw::{Numberless, RawLog};
 use crate::series::Series;
 
@@ -89,7 +89,7 @@ pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
         return Err(numberless_stamps(stamps));
     }
     let mut time = stamps.values.clone();
-    seconds(&mut time);
+    let unit = seconds(&mut time);
     let first = time.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
     time.iter_mut().for_each(|t| *t -= first);
     let others = || {
@@ -107,7 +107,7 @@ pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
             .collect(),
         series: others().filter_map(|c| series(&time, c)).collect(),
         stamps: Some(stamps.name.clone()),
-        remarks: Vec::new(),
+        remarks: unit.map(stamps_read_as).into_iter().collect(),
     })
 }
 

@@ -70,6 +70,10 @@ impl Trial {
         let before = simulator.save(own)?;
         let mut state = vec![0.0; self.state.width()];
         simulator.read(own, &self.state, &mut state)?;
+        if state.iter().any(|x| !x.is_finite()) {
+            // A replay that diverged marks nothing.
+            return Ok(());
+        }
         simulator.load(&before, &vec![0; n], &self.sims)?;
         let mut stepped = vec![0.0; n * width];
         let control = Control::PerSimulation(commands);

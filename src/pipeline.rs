@@ -81,7 +81,7 @@ pub fn episode_information(
 }
 
 /// [`episode_information`] with the expected deviations of [`expected_deviation`], which uses an
-/// identifier's noise model.
+/// identifier's noise model and, where there are `models`, its simulations in these.
 ///
 /// The replacement takes place where the settings describe what identification sees: trajectory
 /// form, start pose estimated jointly, roughness included. They must also ask for at least one fit.
@@ -91,6 +91,7 @@ pub fn episode_information(
 /// When the engine fails.
 pub fn episode_information_as(
     problem: &Problem<'_>,
+    models: Option<&dyn Model>,
     settings: &FisherSettings,
     expected: &ExpectedSettings,
     theta: &[f64],
@@ -102,7 +103,13 @@ pub fn episode_information_as(
         settings.form == Form::Trajectory && settings.nuisance && settings.roughness;
     if as_identified
         && expected.rounds > 0
-        && let Some(deviations) = expected_deviation(problem, expected, theta, start, actions)?
+        && let Some(deviations) = expected_deviation(
+            &simulated_in(problem, models),
+            expected,
+            theta,
+            start,
+            actions,
+        )?
     {
         for (row, better) in out.expected_std.iter_mut().zip(deviations) {
             for (std, x) in row.iter_mut().zip(better) {
@@ -154,8 +161,8 @@ pub struct Method<'m> {
     pub identifier: Option<&'m dyn Identifier>,
     /// How to solve.
     pub solver: &'m dyn TaskSolver,
-    /// The models that share the simulations of the identifier, where errors of the simulator are
-    /// taken into account.
+    /// The models that share the simulations of an identifier that measures how they scatter, where
+    /// errors of the simulator are taken into account.
     pub ensemble: Option<&'m dyn Model>,
     /// Values of the unknowns that the solver is given where nothing is identified.
     pub known: Option<&'m [f64]>,
@@ -202,9 +209,12 @@ pub fn run(
         costs.push(clock.lap("explore"));
     }
 
+    let assumes = method.identifier.map(Identifier::assumes);
+    let assumes = assumes.unwrap_or_default();
+    let models = method.ensemble.filter(|_| assumes.scatter);
     let mut identified = None;
     if let (Some(identifier), Some(real)) = (method.identifier, &real) {
-        let problem = simulated_in(problem, method.ensemble);
+        let problem = simulated_in(problem, models);
         identified = Some(identifier.identify(&problem, std::slice::from_ref(&real.episode))?);
         costs.push(clock.lap("identify"));
     }
@@ -222,12 +232,10 @@ pub fn run(
     let information = match (&real, &identified) {
         (Some(real), Some(found)) => episode_information_as(
             problem,
+            models,
             &FisherSettings::default(),
             &ExpectedSettings {
-                assumes: method
-                    .identifier
-                    .map(Identifier::assumes)
-                    .unwrap_or_default(),
+                assumes,
                 ..method.expected
             },
             &belief.mean(),

@@ -85,11 +85,15 @@ impl<'a> Designer<'_, 'a> {
     ) -> Result<Designed> {
         self.bound_open_drives()?;
         if self.family.is_empty() {
+            let message = if self.player.plant.layout.nu() == 0 {
+                "the model has no actuator: without a command there is no motion to plan"
+            } else {
+                "no actuator has a range to move in: give its joint or command one, such as --limit-position \
+                 JOINT:LOW:HIGH or --limit-speed JOINT:SPEED"
+            };
             return Err(Error::Config {
                 key: "actuator".into(),
-                message: "no actuator has a range to move in: give its joint or command one, such as --limit-position \
-                          JOINT:LOW:HIGH or --limit-speed JOINT:SPEED"
-                    .into(),
+                message: message.into(),
             });
         }
         let mut rng = streams.stream("design");

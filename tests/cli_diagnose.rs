@@ -420,7 +420,7 @@ fn an_ordinary_log_is_read_and_what_was_done_is_said() {
     let result = diagnosed("b");
     let (ok, said) = check(&result, "log");
     assert!(
-        ok && said.contains("`battery`") && said.contains("stamps are in us"),
+        ok && said.contains("`battery`") && said.contains("stamps are read as us"),
         "{said}"
     );
     assert!(check(&result, "outliers").1.contains("6 of `dx`"));

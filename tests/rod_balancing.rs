@@ -11,7 +11,6 @@ use asid::algorithms::identify::Likelihood;
 use asid::algorithms::identify::expected::{ExpectedSettings, expected_deviation};
 use asid::core::identify::Assumptions;
 use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, all, find};
-use asid::core::tracker::TrackerPrior;
 use asid::core::{Control, Policy, Problem, RealWorld, Rollout};
 use asid::pipeline::episode_information;
 use asid::worlds::SimulatedWorld;
@@ -171,7 +170,7 @@ fn what_a_run_expects_of_a_slow_tracker_is_less() {
             let settings = ExpectedSettings {
                 assumes: Assumptions {
                     correlated: true,
-                    tracker: TrackerPrior::NONE,
+                    ..Assumptions::default()
                 },
                 ..ExpectedSettings::default()
             };

@@ -6,7 +6,8 @@
 //! (`algorithms/identify/emulator.rs`) then weighs readings by it, and its intervals hold under
 //! such errors.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 
 use asid_core::backend::Model;
 use asid_core::error::{Error, Result};
@@ -62,15 +63,20 @@ impl Model for Ensemble {
 
     fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>> {
         let count = self.members.len();
-        let sizes = (0..count).map(|k| config.size.saturating_sub(k).div_ceil(count));
+        // An engine refuses an empty batch, so a member without a simulation of its own has a spare
+        // one.
+        let sizes = (0..count).map(|k| config.size.saturating_sub(k).div_ceil(count).max(1));
+        let lanes = config.thread_count().clamp(1, count);
         let made = self.members.iter().zip(sizes).map(|(member, size)| {
             member.simulator(&BatchConfig {
                 size,
+                threads: (config.thread_count() / lanes).max(1),
                 ..config.clone()
             })
         });
         Ok(Box::new(Shared {
             members: made.collect::<Result<_>>()?,
+            lanes,
             columns: config.targets.len(),
             status: vec![Status::Running; config.size],
         }))
@@ -80,6 +86,8 @@ impl Model for Ensemble {
 /// The simulations of an ensemble.
 struct Shared {
     members: Vec<Box<dyn Simulator>>,
+    /// Members that simulate at a time.
+    lanes: usize,
     columns: usize,
     status: Vec<Status>,
 }
@@ -100,6 +108,48 @@ impl Part {
         rows.flat_map(|row| &all[row * width..(row + 1) * width])
             .copied()
             .collect()
+    }
+
+    /// The readings of a rollout of the part.
+    fn played(&self, member: &mut dyn Simulator, rollout: &Rollout<'_>) -> Result<Vec<f64>> {
+        let (frames, width) = (rollout.frames, rollout.record.width());
+        let commands;
+        let control = match rollout.control {
+            Control::Shared(_) => rollout.control,
+            Control::PerSimulation(all) => {
+                commands = self.of(all, frames * member.layout().nu());
+                Control::PerSimulation(&commands)
+            }
+        };
+        let wrenches = rollout.forces.iter().map(|f| self.of(f.wrench, 6 * frames));
+        let wrenches: Vec<Vec<f64>> = wrenches.collect();
+        let forces = rollout.forces.iter().zip(&wrenches);
+        let forces: Vec<ExternalForce<'_>> = forces
+            .map(|(f, wrench)| ExternalForce { wrench, ..*f })
+            .collect();
+        let values = rollout.changes.iter().map(|c| self.of(c.values, 1));
+        let values: Vec<Vec<f64>> = values.collect();
+        let changes = rollout.changes.iter().zip(&values);
+        let changes: Vec<ParameterChange<'_>> = changes
+            .map(|(c, values)| ParameterChange { values, ..*c })
+            .collect();
+        let hook = rollout.hook.map(|hook| Renumbered {
+            hook,
+            rows: &self.rows,
+        });
+        let mut out = vec![0.0; self.sims.len() * frames * width];
+        member.rollout(
+            &Rollout {
+                sims: &self.sims,
+                control,
+                forces: &forces,
+                changes: &changes,
+                hook: hook.as_ref().map(|hook| hook as &dyn StepHook),
+                ..*rollout
+            },
+            &mut out,
+        )?;
+        Ok(out)
     }
 
     /// Writes the rows of the part into the array of the whole.
@@ -229,46 +279,32 @@ impl Simulator for Shared {
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
         rollout.check(self.layout(), self.status.len(), self.columns, out)?;
-        let (frames, width) = (rollout.frames, rollout.record.width());
-        let block = frames * self.layout().nu();
-        for part in self.parts(rollout.sims)? {
-            let commands;
-            let control = match rollout.control {
-                Control::Shared(_) => rollout.control,
-                Control::PerSimulation(all) => {
-                    commands = part.of(all, block);
-                    Control::PerSimulation(&commands)
+        let parts = self.parts(rollout.sims)?;
+        // A simulation keeps to its member, so the results do not depend on the lanes.
+        let work = Mutex::new(self.members.iter_mut().enumerate());
+        let lane = || -> Result<Vec<(&Part, Vec<f64>)>> {
+            let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
+            let mut played = Vec::new();
+            while let Some((k, member)) = next() {
+                if let Some(part) = parts.iter().find(|part| part.member == k) {
+                    played.push((part, part.played(&mut **member, rollout)?));
                 }
-            };
-            let wrenches = rollout.forces.iter().map(|f| part.of(f.wrench, 6 * frames));
-            let wrenches: Vec<Vec<f64>> = wrenches.collect();
-            let forces = rollout.forces.iter().zip(&wrenches);
-            let forces: Vec<ExternalForce<'_>> = forces
-                .map(|(f, wrench)| ExternalForce { wrench, ..*f })
-                .collect();
-            let values = rollout.changes.iter().map(|c| part.of(c.values, 1));
-            let values: Vec<Vec<f64>> = values.collect();
-            let changes = rollout.changes.iter().zip(&values);
-            let changes: Vec<ParameterChange<'_>> = changes
-                .map(|(c, values)| ParameterChange { values, ..*c })
-                .collect();
-            let hook = rollout.hook.map(|hook| Renumbered {
-                hook,
-                rows: &part.rows,
+            }
+            Ok(played)
+        };
+        let played: Result<Vec<_>> = thread::scope(|scope| {
+            let others: Vec<_> = (1..self.lanes).map(|_| scope.spawn(lane)).collect();
+            let own = std::iter::once(lane());
+            let joined = others.into_iter().map(|other| {
+                other
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             });
-            let mut own = vec![0.0; part.sims.len() * frames * width];
-            self.members[part.member].rollout(
-                &Rollout {
-                    sims: &part.sims,
-                    control,
-                    forces: &forces,
-                    changes: &changes,
-                    hook: hook.as_ref().map(|hook| hook as &dyn StepHook),
-                    ..*rollout
-                },
-                &mut own,
-            )?;
-            part.write(&own, frames * width, out);
+            own.chain(joined).collect()
+        });
+        let row = rollout.frames * rollout.record.width();
+        for (part, own) in played?.into_iter().flatten() {
+            part.write(&own, row, out);
         }
         self.look();
         Ok(())

@@ -15,6 +15,10 @@ use crate::{Perturbation, PerturbationRanges, perturb};
 /// Key of the section in a configuration.
 pub const MODEL_ERRORS: &str = "model_errors";
 
+/// Fewest members: from `m` models the standard deviation that they cause is known to
+/// `1 / sqrt(2 (m - 1))` of its value, from four to 41 %. A single one would be another model that is
+/// taken as certain.
+const MIN_MEMBERS: usize = 4;
 /// Largest number of members: the scatter over this many models is known to 9 % of its standard
 /// deviation.
 const MAX_MEMBERS: usize = 64;
@@ -27,8 +31,8 @@ const MAX_MEMBERS: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelErrors {
-    /// Models. 0, the default, for the model as it is; 16 tell the scatter that they cause to 18 %
-    /// of its standard deviation.
+    /// Models, 4 to 64. 0, the default, for the model as it is; 16 tell the scatter that they cause
+    /// to 18 % of its standard deviation.
     pub members: usize,
     /// Factor on the time constant of every contact, 1. Default 0.7 to 1.4: a scene's contact
     /// softness is usually chosen and not measured (estimate). 1 is null.
@@ -63,10 +67,13 @@ impl ModelErrors {
     /// [`Error::Config`] naming the key.
     pub fn read(table: &toml::Table) -> Result<Self> {
         let errors: Self = registry::settings(MODEL_ERRORS, table)?;
-        if errors.members > MAX_MEMBERS {
+        let members = errors.members;
+        if members != 0 && !(MIN_MEMBERS..=MAX_MEMBERS).contains(&members) {
             return Err(Error::Config {
                 key: format!("{MODEL_ERRORS}.members"),
-                message: format!("is {}, and at most {MAX_MEMBERS}", errors.members),
+                message: format!(
+                    "{members} is not 0 (the model as it is) or {MIN_MEMBERS} to {MAX_MEMBERS}"
+                ),
             });
         }
         errors.ranges().check(MODEL_ERRORS)?;

@@ -153,11 +153,8 @@ impl BatchEnvironment for FisherEnvironment<'_> {
             *ended |= !alive;
         }
         // The horizon is part of the task and the time is observed: reaching it terminates the
-        // episode and does not truncate it. An episode that diverged terminates at once and earns 0
-        // until the horizon.
-        for (terminated, ended) in transition.terminated.iter_mut().zip(&self.ended) {
-            *terminated = over || *ended;
-        }
+        // episode and does not truncate it. An episode that diverged earns 0 until then.
+        transition.terminated.fill(over);
         for (reward, ended) in transition.reward.iter_mut().zip(&self.ended) {
             *reward = if *ended { 0.0 } else { *reward };
         }

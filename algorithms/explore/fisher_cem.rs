@@ -117,6 +117,7 @@ impl Planner for FisherCem {
             let costs: Vec<f64> = returns.iter().map(|r| -r).collect();
             cem.tell(&candidates, &costs);
             let mut order: Vec<usize> = (0..returns.len()).collect();
+            order.retain(|&i| returns[i].is_finite());
             order.sort_by(|&i, &j| returns[j].total_cmp(&returns[i]));
             finalists.extend(order.iter().take(kept).map(|&i| candidates[i].clone()));
             curve.push(CurvePoint::of(iteration + 1, &returns));
@@ -169,6 +170,9 @@ impl<'a> Trials<'a> {
     }
 
     /// Mean return of each candidate over `samples` draws of the unknowns, the same draws for all.
+    ///
+    /// NaN where a simulation diverged: such a plan is not played on a machine, whatever it earned
+    /// before.
     fn returns(
         &mut self,
         candidates: &[Vec<f64>],
@@ -199,6 +203,9 @@ impl<'a> Trials<'a> {
                 *sum += r;
             }
             self.problem.progress.advance(1);
+        }
+        for (sum, alive) in returns.iter_mut().zip(self.batch.alive()) {
+            *sum = if *alive { *sum } else { f64::NAN };
         }
         Ok(returns[..candidates.len() * samples]
             .chunks_exact(samples)

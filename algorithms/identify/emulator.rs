@@ -42,6 +42,16 @@ const RIDGE: f64 = 1e-6;
 /// are points to fit.
 pub const REACH: f64 = 3.0;
 
+/// Steps towards the best point; the quadratic model of a few entries takes about ten.
+const MINIMUM_STEPS: usize = 60;
+
+/// Alternating projections onto the box and the reach, before what is left outside moves to the
+/// middle. Each at least halves the distance unless the two sets meet at a small angle.
+const PROJECTIONS: usize = 30;
+
+/// An entry this close to a side of the box, in widths of the box, is at the side; above rounding.
+const AT_SIDE: f64 = 1e-9;
+
 /// A quadratic model of the residuals over a region.
 pub struct Emulator {
     region: Gaussian,
@@ -50,7 +60,7 @@ pub struct Emulator {
     /// The matrix of the widened loss, `phi^T G phi / 2`: as wide as the sandwich, and divided by the
     /// mismatch.
     widened: DMatrix<f64>,
-    /// Best point within reach, standardised.
+    /// Best point within reach and in the box, standardised.
     best: DVector<f64>,
     /// Root mean square of the emulated whitened residual at its best point.
     pub residual: f64,
@@ -147,7 +157,7 @@ impl Emulator {
             roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
             misfit: 0.0,
         };
-        let best = emulator.minimum(n);
+        let best = emulator.minimum();
         let best_features = DVector::from_vec(features(&best));
         // Residual at the best point in units of the noise; the mismatch also counts the roughness.
         let at_best = a.transpose() * &best_features;
@@ -200,29 +210,58 @@ impl Emulator {
         half_square(&self.widened, &self.region.standardise(x))
     }
 
-    /// The best point within reach, in standardised coordinates, by damped Newton steps.
-    fn minimum(&self, n: usize) -> Vec<f64> {
+    /// The best point within reach and in the box, in standardised coordinates.
+    ///
+    /// Damped Gauss-Newton steps (Levenberg-Marquardt) in the coordinates of the search space, in
+    /// which the box has one entry a side: an entry at a side from which the loss falls outwards
+    /// keeps its place.
+    fn minimum(&self) -> Vec<f64> {
+        let n = self.region.mean().len();
+        let (low, high) = self.region.bounds();
+        // Columns `du / dx_j`.
+        let columns: Vec<DVector<f64>> = (0..n)
+            .map(|j| {
+                let mut beside = self.region.mean().to_vec();
+                beside[j] += 1.0;
+                DVector::from_vec(self.region.standardise(&beside))
+            })
+            .collect();
+        let to_u = DMatrix::from_columns(&columns);
         let mut u = vec![0.0; n];
         let mut loss = self.loss_at(&u);
-        let mut damping = 1e-3
-            * (0..n)
-                .map(|i| self.gram[(1 + i, 1 + i)])
-                .fold(1.0, f64::max);
-        for _ in 0..60 {
+        let mut damping = 1e-3;
+        for _ in 0..MINIMUM_STEPS {
+            let x = self.region.unstandardise(&u);
             let phi = DVector::from_vec(features(&u));
             let slopes: Vec<DVector<f64>> = (0..n)
                 .map(|k| DVector::from_vec(feature_slope(&u, k)))
                 .collect();
             let g_phi = &self.gram * &phi;
-            let gradient = DVector::from_fn(n, |k, _| slopes[k].dot(&g_phi));
-            let hessian = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.gram * &slopes[j])));
-            let Some(factor) = (hessian + DMatrix::identity(n, n) * damping).cholesky() else {
+            let gradient = to_u.tr_mul(&DVector::from_fn(n, |k, _| slopes[k].dot(&g_phi)));
+            let free: Vec<usize> = (0..n)
+                .filter(|&i| {
+                    let margin = AT_SIDE * (high[i] - low[i]);
+                    let held = (x[i] <= low[i] + margin && gradient[i] > 0.0)
+                        || (x[i] >= high[i] - margin && gradient[i] < 0.0);
+                    !held
+                })
+                .collect();
+            let curvature =
+                DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.gram * &slopes[j])));
+            let curvature = to_u.tr_mul(&curvature) * &to_u;
+            let mut of_free = curvature.select_rows(&free).select_columns(&free);
+            for i in 0..free.len() {
+                of_free[(i, i)] = of_free[(i, i)] * (1.0 + damping) + f64::MIN_POSITIVE;
+            }
+            let Some(factor) = of_free.cholesky() else {
                 break;
             };
-            let step = factor.solve(&gradient);
-            let next: Vec<f64> = (0..n)
-                .map(|i| (u[i] - step[i]).clamp(-REACH, REACH))
-                .collect();
+            let step = factor.solve(&gradient.select_rows(&free));
+            let mut next = x;
+            for (k, &i) in free.iter().enumerate() {
+                next[i] -= step[k];
+            }
+            let next = self.nearest(&self.region.standardise(&next));
             let next_loss = self.loss_at(&next);
             if next_loss < loss {
                 (u, loss) = (next, next_loss);
@@ -230,6 +269,44 @@ impl Emulator {
             } else {
                 damping *= 5.0;
             }
+        }
+        u
+    }
+
+    /// Whether a standardised point is within reach and in the box.
+    fn inside(&self, u: &[f64]) -> bool {
+        let (low, high) = self.region.bounds();
+        let x = self.region.unstandardise(u);
+        let mut entries = x.iter().zip(low.iter().zip(high));
+        u.iter().all(|v| v.abs() <= REACH) && entries.all(|(x, (l, h))| x >= l && x <= h)
+    }
+
+    /// A point within reach and in the box that is close to a standardised one, by alternating
+    /// projections: to clamp an entry of the search space moves correlated standardised ones, and
+    /// the reverse. The region's middle is inside of both.
+    fn nearest(&self, u: &[f64]) -> Vec<f64> {
+        let (low, high) = self.region.bounds();
+        let mut u = u.to_vec();
+        for _ in 0..PROJECTIONS {
+            if self.inside(&u) {
+                return u;
+            }
+            for v in &mut u {
+                *v = v.clamp(-REACH, REACH);
+            }
+            let x = self.region.unstandardise(&u);
+            let x: Vec<f64> = x
+                .iter()
+                .zip(low.iter().zip(high))
+                .map(|(x, (l, h))| x.clamp(*l, *h))
+                .collect();
+            u = self.region.standardise(&x);
+        }
+        // By as little as rounding needs, and by more where the sets meet at a small angle.
+        let mut share = f64::EPSILON;
+        while !self.inside(&u) && share < 1.0 {
+            u.iter_mut().for_each(|v| *v *= 1.0 - share);
+            share *= 2.0;
         }
         u
     }
@@ -242,32 +319,13 @@ impl Emulator {
 
     /// Draws `count` equally weighted points of the posterior by an ensemble of walkers.
     ///
-    /// The walkers stay inside the box and within reach of the region's middle.
-    pub fn sample(&self, low: &[f64], high: &[f64], count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
+    /// The walkers stay in the region's box and within reach of its middle.
+    pub fn sample(&self, count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = self.region.mean().len();
-        let inside = |u: &[f64]| {
-            let x = self.region.unstandardise(u);
-            u.iter().all(|v| v.abs() <= REACH)
-                && x.iter()
-                    .zip(low)
-                    .zip(high)
-                    .all(|((x, l), h)| x >= l && x <= h)
-        };
-        let mut u = self.best.as_slice().to_vec();
-        if !inside(&u) {
-            let x: Vec<f64> = self
-                .region
-                .unstandardise(&u)
-                .iter()
-                .zip(low)
-                .zip(high)
-                .map(|((x, l), h)| x.clamp(*l, *h))
-                .collect();
-            u = self.region.standardise(&x);
-        }
+        let u = self.best.as_slice();
         // The walkers begin with the curvature at the best point.
         let slopes: Vec<DVector<f64>> = (0..n)
-            .map(|k| DVector::from_vec(feature_slope(&u, k)))
+            .map(|k| DVector::from_vec(feature_slope(u, k)))
             .collect();
         let h = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.widened * &slopes[j])));
         let curvature = h + DMatrix::identity(n, n) * REACH.powi(-2);
@@ -276,14 +334,14 @@ impl Emulator {
             .map(|c| c.inverse())
             .and_then(|c| c.cholesky())
         else {
-            return vec![self.region.unstandardise(&u); count];
+            return vec![self.region.unstandardise(u); count];
         };
         let walk = Walk {
             shape: factor.l(),
-            inside: &inside,
+            inside: &|u: &[f64]| self.inside(u),
             loss: &|u: &[f64]| half_square(&self.widened, u),
         };
-        let drawn = walk.draws(&u, count, rng);
+        let drawn = walk.draws(u, count, rng);
         drawn.iter().map(|u| self.region.unstandardise(u)).collect()
     }
 }

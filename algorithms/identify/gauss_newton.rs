@@ -93,6 +93,8 @@ impl Identifier for GaussNewtonIdentifier {
         Assumptions {
             correlated: self.gauss_newton.correlated,
             tracker: self.tracker,
+            // Its descent takes differences of single simulations.
+            scatter: false,
         }
     }
 }

@@ -241,7 +241,7 @@ pub fn posterior(
         let present = likelihood.present();
         let emulator = Emulator::fit(&region, &points, &residuals, present, settings.correlated)
             .ok_or_else(too_few)?;
-        let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
+        let drawn = emulator.sample(settings.samples.max(2), rng);
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
         let posterior =
             Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)?;

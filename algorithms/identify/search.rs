@@ -85,6 +85,7 @@ impl<R: UpdateRule> Course<'_, R> {
         Assumptions {
             correlated: self.sampling.correlated,
             tracker: self.tracker,
+            scatter: true,
         }
     }
 

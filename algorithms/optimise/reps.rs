@@ -111,7 +111,9 @@ impl UpdateRule for RepsSettings {
         costs: &[f64],
     ) -> Option<Gaussian> {
         let usable: Vec<usize> = (0..costs.len()).filter(|&i| costs[i].is_finite()).collect();
-        if usable.len() < 2 {
+        // The relative entropy of weights over n draws is at most ln n. Where the bound allows that,
+        // all weight would go to the best draw, and one draw is no distribution.
+        if usable.len() < 2 || (usable.len() as f64).ln() <= self.epsilon {
             return None;
         }
         let rewards: Vec<f64> = usable.iter().map(|&i| -costs[i]).collect();

@@ -39,12 +39,14 @@ pub struct CurvePoint {
 }
 
 impl CurvePoint {
-    /// The point of an iteration, counted from 1, from its returns.
+    /// The point of an iteration, counted from 1, from its returns; those of episodes that diverged
+    /// are NaN and do not count.
     #[must_use]
     pub fn of(iteration: usize, returns: &[f64]) -> Self {
-        let n = returns.len() as f64;
-        let mean = returns.iter().sum::<f64>() / n;
-        let variance = returns.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / n;
+        let returns = || returns.iter().filter(|r| r.is_finite());
+        let n = returns().count() as f64;
+        let mean = returns().sum::<f64>() / n;
+        let variance = returns().map(|r| (r - mean).powi(2)).sum::<f64>() / n;
         Self {
             x: iteration as f64,
             mean,

@@ -48,6 +48,9 @@ pub struct Assumptions {
     pub correlated: bool,
     /// Systematic errors of the trackers, which are marginalised.
     pub tracker: TrackerPrior,
+    /// Whether the scatter of nearby simulations is measured and is part of the likelihood. Models
+    /// that differ may then share the simulations, and the intervals include what they differ by.
+    pub scatter: bool,
 }
 
 impl Default for Assumptions {
@@ -55,6 +58,7 @@ impl Default for Assumptions {
         Self {
             correlated: false,
             tracker: TrackerPrior::NONE,
+            scatter: false,
         }
     }
 }

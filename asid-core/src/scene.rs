@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use asid_documents::guard::{guarded, one_line};
-use asid_documents::xml::{Fault, parse, spliced, wrong_eulerseq};
+use asid_documents::xml::{Fault, parse, spliced, wrong_eulerseq, wrong_number};
 
 use crate::error::{Error, Result};
 use normal_form::{attached_last, normal_form};
@@ -81,13 +81,15 @@ impl Scene {
                 message: format!("the root element is <{root}>, but MJCF begins with <mujoco>"),
             });
         }
-        if let Some((node, given)) = wrong_eulerseq(&document) {
+        let order = wrong_eulerseq(&document).map(|(node, given)| {
+            let what = "is not three of the letters x, y, z, X, Y and Z";
+            (node, format!("eulerseq=\"{given}\" {what}"))
+        });
+        if let Some((node, what)) = order.or_else(|| wrong_number(&document)) {
+            let line = document.text_pos_at(node.range().start).row;
             return Err(Error::Scene {
                 scene: name,
-                message: format!(
-                    "line {}: eulerseq=\"{given}\" is not three of the letters x, y, z, X, Y and Z",
-                    document.text_pos_at(node.range().start).row
-                ),
+                message: format!("line {line}: {what}"),
             });
         }
         Ok(Self {
@@ -334,6 +336,31 @@ mod tests {
                 .description()
                 .is_ok()
         );
+    }
+
+    /// Symptom: an abort in a replay, or fits to a body of negative mass. Cause: a time step of zero,
+    /// and numbers that some engine computes with.
+    #[test]
+    fn numbers_that_no_machine_has_are_refused() {
+        let scene = |line: &str| {
+            let xml =
+                format!("<mujoco>\n{line}\n<worldbody><body name='inf'/></worldbody></mujoco>");
+            Scene::from_xml("s", &xml, &[])
+        };
+        for line in [
+            "<option timestep='0'/>",
+            "<option timestep='-0.1'/>",
+            "<option gravity='0 0 nan'/>",
+            "<default><geom mass='-0.5'/></default>",
+            "<default><geom density='-1'/></default>",
+            "<default><geom mass='inf'/></default>",
+        ] {
+            // A body may be called so, and `mass` then is no reference to it.
+            let line = line.replace("'inf'", "'infinity'");
+            let error = scene(&line).unwrap_err().to_string();
+            assert!(error.contains("line 2: "), "{error}");
+        }
+        assert!(scene("<contact><exclude body1='inf' body2='world'/></contact>").is_ok());
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub fn settings<S: serde::de::DeserializeOwned>(section: &str, table: &Settings)
     check_finite(section, table)?;
     S::deserialize(toml::Value::Table(table.clone())).map_err(|e| Error::Config {
         key: section.to_owned(),
-        message: asid_documents::guard::one_line(e.message()),
+        message: asid_documents::toml_text::keyed(&e),
     })
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use asid_core::parameter::Scale;
 use asid_core::{Episode, Error, Layout, Parameter, Result, Target};
+use asid_documents::toml_text;
 use asid_effects::refined_model::RefinedModel;
 use asid_logs::LogSettings;
 use asid_logs::counted::check_units;
@@ -134,7 +135,7 @@ impl Study {
             })
         })?;
         let document: Document =
-            asid_documents::toml_text::read(&text).map_err(|e| fail(one_line(&e)))?;
+            toml_text::read(&text).map_err(|e| fail(toml_text::located(&text, &e)))?;
         let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
         let own = || folder.join(&document.model);
         let model = model.map_or_else(own, Path::to_path_buf);
@@ -192,15 +193,6 @@ impl Study {
         }
         .with_test()
     }
-}
-
-/// Returns the message of a TOML parser on one line.
-fn one_line(error: &toml::de::Error) -> String {
-    error
-        .message()
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
 }
 
 /// Checks that the machine has the geom, body, joint or actuator that a target names; the engine

@@ -13,11 +13,13 @@ mod misses;
 mod placement;
 
 use asid_core::layout::Recording;
+use asid_core::problem::home;
 use asid_core::{BatchConfig, Control, Parameter, Result, Rollout, Simulator};
 use asid_mjcf::Plant;
 
 use crate::machine::Machine;
 
+use super::hypotheses::LATEST;
 use super::record::Recorded;
 use super::view::{ColumnView, View};
 
@@ -130,6 +132,13 @@ impl<'a> Windows<'a> {
         }))
     }
 
+    /// Largest delay at which every window still has readings, s.
+    #[must_use]
+    pub fn latest(&self) -> f64 {
+        let behind = |w: &Window| self.record[w.episode].seconds() - w.start - self.duration;
+        self.windows.iter().map(behind).fold(LATEST, f64::min)
+    }
+
     /// Ranges of the study's parameters.
     #[must_use]
     pub fn ranges(&self) -> Vec<[f64; 2]> {
@@ -178,7 +187,11 @@ impl<'a> Windows<'a> {
         let (mut qpos, mut qvel) = (Vec::new(), Vec::new());
         let mut control = Vec::with_capacity(n * self.frames * nu);
         for window in sims.iter().map(|&w| self.windows[w]) {
-            let (q, v) = self.state(view, window);
+            let (mut q, mut v) = self.state(view, window);
+            if q.iter().chain(&v).any(|x| !x.is_finite()) {
+                // No state of the machine is read here: the prediction from home misses it.
+                (q, v) = home(&self.plant.layout);
+            }
             qpos.extend(q);
             qvel.extend(v);
             let record = &self.record[window.episode];

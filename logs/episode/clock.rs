@@ -75,6 +75,15 @@ pub(super) fn to_seconds(stamps: &mut [f64], given: Option<f64>, notes: &mut Log
     stamps.iter_mut().for_each(|t| *t = (*t - start) * length);
 }
 
+/// The note on stamps in another unit than the second.
+#[must_use]
+pub fn stamps_read_as(unit: &str) -> String {
+    format!(
+        "stamps are read as {unit}, by their rate or date, and counted from the first: `[[column]] name = \"time\"` with `unit` states another \
+         unit"
+    )
+}
+
 /// Converts stamps of an unknown unit to seconds; returns the unit if it is not the second.
 pub fn seconds(stamps: &mut [f64]) -> Option<&'static str> {
     let mut notes = LogNotes::default();

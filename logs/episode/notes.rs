@@ -2,6 +2,8 @@
 
 use asid_core::{Error, Result};
 
+use super::clock::stamps_read_as;
+
 /// What a reader skipped and repaired.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LogNotes {
@@ -95,9 +97,7 @@ impl LogNotes {
             ));
         }
         if let Some(unit) = self.time_unit {
-            all.push(format!(
-                "stamps are in {unit}: brought to seconds from the first"
-            ));
+            all.push(stamps_read_as(unit));
         }
         for (count, what) in [
             (self.doubled, "rows with the stamp of another left out"),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use asid_core::parameter::Scale;
 use asid_core::{Episode, Error, Parameter, Result, Target};
+use asid_documents::toml_text;
 use asid_effects::RefinedModel;
 use asid_mjcf::Plant;
 use serde::Deserialize;
@@ -127,7 +128,7 @@ fn document(folder: &Path) -> Result<Document> {
         message,
     };
     let text = std::fs::read_to_string(&file).map_err(|e| fail(e.to_string()))?;
-    asid_documents::toml_text::read(&text).map_err(|e| fail(e.message().replace('\n', " ")))
+    toml_text::read(&text).map_err(|e| fail(toml_text::located(&text, &e)))
 }
 
 /// Files of a folder that match a pattern, sorted. The last part of the pattern may have one `*`.

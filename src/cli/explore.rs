@@ -237,6 +237,12 @@ fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
         let message = "goes with a task: the motion of a study or model is played by you";
         return Err(wrong(option, message).into());
     }
+    let of_explorer = |set: &&String| set.starts_with("explorer.");
+    if let Some(set) = common.set.iter().find(of_explorer) {
+        let key = set.split('=').next().unwrap_or(set);
+        let message = "goes with a task: a motion has the settings of [design], as `asid config STUDY --of explore` prints them";
+        return Err(wrong(key, message).into());
+    }
     let mut common = common.clone();
     if let Some(explorer) = &arguments.explorer {
         common.set.push(format!("explorer=\"{explorer}\""));

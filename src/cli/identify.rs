@@ -99,7 +99,7 @@ pub struct IdentifyResult {
 fn fitted(session: &Session, episodes: &[Episode]) -> Result<Identified> {
     let component = &session.config.identifier;
     let identifier = (find::<IdentifierEntry>(&component.name)?.make)(&component.settings)?;
-    let ensemble = session.ensemble()?;
+    let ensemble = session.ensemble_for(&*identifier)?;
     let models = ensemble.as_ref().map(|e| e as &dyn Model);
     let problem = session.problem();
     Ok(identifier.identify(&simulated_in(&problem, models), episodes)?)

@@ -97,6 +97,13 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     let subject = sensors::with_sensors(subject, &mut notes)?;
     let (raw, settings) = open(&arguments.logs, &arguments.test, &arguments.topic)?;
     let kind = settings.kind.unwrap_or(LogFormat::Csv);
+    if kind == LogFormat::Csv && !arguments.topic.is_empty() {
+        return Err(Error::Config {
+            key: "--topic".into(),
+            message: "a CSV file has no topics".into(),
+        }
+        .into());
+    }
     let given = given(&arguments.map)?;
     if raw.is_empty() {
         return Err(Error::Failed("no log holds an episode".into()).into());
@@ -162,7 +169,17 @@ fn given(map: &[String]) -> Result<Vec<(String, String)>> {
         })?;
         Ok((name.to_owned(), column.to_owned()))
     };
-    map.iter().map(one).collect()
+    let all: Vec<(String, String)> = map.iter().map(one).collect::<Result<_>>()?;
+    for (i, (name, column)) in all.iter().enumerate() {
+        if let Some((_, other)) = all[..i].iter().find(|(n, c)| n == name && c != column) {
+            return Err(Error::Config {
+                key: "--map".into(),
+                message: format!("gives `{name}` two columns, `{other}` and `{column}`"),
+            }
+            .into());
+        }
+    }
+    Ok(all)
 }
 
 /// Refuses a mapping from which no diagnosis can start; `log` is where it was sought.

@@ -122,7 +122,7 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
     let identifier =
         (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
     let solver = (find::<SolverEntry>(&config.solver.name)?.make)(&config.solver.settings)?;
-    let ensemble = session.ensemble()?;
+    let ensemble = session.ensemble_for(&*identifier)?;
     let method = Method {
         explorer: Some(&*explorer),
         identifier: Some(&*identifier),

@@ -6,9 +6,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
-use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Streams, Task};
+use asid_core::{
+    Backend, Capabilities, Error, Identifier, Model, Parameter, Problem, Streams, Task,
+};
 use asid_effects::refined_model::RefinedModel;
-use asid_worlds::{Ensemble, SimulatedWorld, TrackerErrors};
+use asid_worlds::{Ensemble, MODEL_ERRORS, SimulatedWorld, TrackerErrors};
 
 use super::failure;
 use super::model::{self, Needs};
@@ -138,12 +140,33 @@ impl Session {
         }
     }
 
+    /// The [models](Self::ensemble_if) in which an identifier simulates.
+    ///
+    /// # Errors
+    /// Where models are asked for and the identifier does not measure the scatter that they cause.
+    pub fn ensemble_for(&self, identifier: &dyn Identifier) -> Result<Option<Ensemble>> {
+        let scatter = identifier.assumes().scatter;
+        if self.config.model_errors.members > 0 && !scatter {
+            return Err(Error::Config {
+                key: format!("{MODEL_ERRORS}.members"),
+                message: format!(
+                    "the identifier {} does not measure how simulations scatter; reps, cem and \
+                     cma-es do",
+                    self.config.identifier.name
+                ),
+            }
+            .into());
+        }
+        self.ensemble_if(scatter)
+    }
+
     /// Compiles the models in which the method identifies: its simulator with errors that are drawn
-    /// by the seed. `None` where the simulator is taken as it is.
-    pub fn ensemble(&self) -> Result<Option<Ensemble>> {
+    /// by the seed. `None` where the simulator is taken as it is, and for an identifier that does
+    /// not measure the scatter that they cause.
+    pub fn ensemble_if(&self, scatter: bool) -> Result<Option<Ensemble>> {
         let config = &self.config;
         let errors = config.model_errors;
-        if errors.members == 0 {
+        if errors.members == 0 || !scatter {
             return Ok(None);
         }
         let source = match (&self.refined, &config.model) {

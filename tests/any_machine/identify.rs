@@ -150,6 +150,75 @@ fn logs_that_are_all_warm_up_are_called_too_short_for_a_gap() {
     let said = ok(&place, &["export", "cart", "--mjcf", "out.xml"]);
     assert!(said.contains("the logs held out are too short"), "{said}");
     assert!(said.contains("gap on the logs fitted"), "{said}");
+    // A diagnosis is of the gap. Its answer was "No gap is left", with 0.00.
+    let done = place.run(&["diagnose", "cart", "--quiet", "--out", "answer"]);
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(!done.status.success(), "{said}");
+    assert!(
+        said.contains("the logs held out are too short for a gap"),
+        "{said}"
+    );
+}
+
+/// Symptom: one broken reading moved a mass by half of its value, and a sensor that read 0 through
+/// all logs ended in "nearly every replay of the logs diverged". Cause: a study was identified from
+/// its logs as they were.
+#[test]
+fn outliers_and_dead_sensors_take_no_part_in_a_fit() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    let fitted = |out: &str| {
+        ok(&place, &["identify", "cart", "--quiet", "--out", out]);
+        json(&place.read(&format!("{out}/result.json")))
+    };
+    let of = |result: &serde_json::Value| result["parameters"][0]["estimate"].as_f64().unwrap();
+    let clean = fitted("clean");
+    let logs = [
+        "train_0.csv",
+        "train_1.csv",
+        "train_2.csv",
+        "train_3.csv",
+        "test_4.csv",
+        "test_5.csv",
+    ];
+    // The second sensor of a row, in one row of one log or in every row of all.
+    let spoil = |log: &str, only: Option<usize>| {
+        let text = place.read(&format!("cart/{log}"));
+        let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let column = head.iter().position(|name| *name == "dx").unwrap();
+        let lines = text.lines().enumerate().map(|(k, line)| {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            match only {
+                Some(row) if row == k => cells[column] = "900",
+                None if k > 0 => cells[column] = "0",
+                _ => {}
+            }
+            cells.join(",") + "\n"
+        });
+        place.write(&format!("cart/{log}"), &lines.collect::<String>());
+    };
+    spoil("train_0.csv", Some(40));
+    let spoilt = fitted("spoilt");
+    assert!((of(&spoilt) / of(&clean) - 1.0).abs() < 1e-3, "{spoilt}");
+    assert!(
+        spoilt["left_out"][0]
+            .as_str()
+            .unwrap()
+            .contains("1 of `dx`"),
+        "{spoilt}"
+    );
+    for log in logs {
+        spoil(log, None);
+    }
+    let dead = fitted("dead");
+    assert!((of(&dead) / of(&clean) - 1.0).abs() < 0.02, "{dead}");
+    assert!(
+        dead["left_out"][0]
+            .as_str()
+            .unwrap()
+            .contains("`dx` always reads 0"),
+        "{dead}"
+    );
 }
 
 /// Symptom: arbitrary estimates, and residuals of hundreds of noises, on logs without a start in

@@ -9,6 +9,8 @@ fn what_is_wrong_is_told_in_one_line() {
     let place = Workplace::new();
     write_study(&place.path("cart"), Truth::None);
     place.write("model.xml", NOMINAL);
+    let unfitted = "model = \"model.xml\"\n[[parameter]]\nname = \"m\"\ntarget = \"geom/cart/mass\"\nrange = [1, 2]\n";
+    place.write("unfitted.toml", unfitted);
     for (arguments, part) in [
         (
             vec!["identify", "nothing-here"],
@@ -36,6 +38,30 @@ fn what_is_wrong_is_told_in_one_line() {
             vec!["explore", "cart", "--model", "nothing.xml"],
             "nothing.xml: no such file",
         ),
+        // Symptom: the study's own logs were diagnosed, without a word.
+        (
+            vec!["diagnose", "cart", "--train", "nothing.csv"],
+            "--train: goes with --task",
+        ),
+        // Symptom: rc 0, with the setting ignored.
+        (
+            vec![
+                "explore",
+                "cart",
+                "--explorer",
+                "random",
+                "--set",
+                "explorer.x=0",
+            ],
+            "explorer.x: goes with a task",
+        ),
+        // Symptom: the key was not named.
+        (
+            vec!["explore", "cart", "--set", "rest_speed=abc"],
+            "`rest_speed`: invalid type",
+        ),
+        // Symptom: it was read as a refined model, whose parameters have no range.
+        (vec!["identify", "unfitted.toml"], "missing field `train`"),
         (
             vec!["explore", "cart", "--world", "perturbed"],
             "--world: goes with a task",
@@ -109,7 +135,7 @@ fn what_is_wrong_is_told_in_one_line() {
         assert!(said.contains(part), "{arguments:?}: {said}");
         assert_eq!(said.trim().lines().count(), 1, "{said}");
     }
-    assert_eq!(place.names(), ["cart", "model.xml"]);
+    assert_eq!(place.names(), ["cart", "model.xml", "unfitted.toml"]);
 }
 
 /// Symptom: a panic in `f64::clamp` if the range of one force limit passes the other limit, and

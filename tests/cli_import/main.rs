@@ -268,6 +268,10 @@ fn wrong_calls_are_one_line_and_write_nothing() {
             "no column is the command of the actuators `pan`, `gripper`",
         ),
         (&["--topic", "/nothing"], "no messages of topic `/nothing`"),
+        (
+            &["--map", "ctrl.pan=a", "--map", "ctrl.pan=b"],
+            "gives `ctrl.pan` two columns, `a` and `b`",
+        ),
         (&["--test", "nowhere.mcap"], "nowhere.mcap"),
     ] {
         let done = import(&logs, &out, more);

@@ -86,7 +86,7 @@ fn roughness_takes_its_share_of_the_information() {
     // counts: about 240 / 40 / 4 / (1 + 1 / (20 * 4)) = 1.5 where the slope has a part in the
     // roughness.
     let found = mean_information(2.0, 40, 1.0, false);
-    assert!(found < 3.0, "{found}");
+    assert!((0.75..3.0).contains(&found), "{found}");
 }
 
 #[test]

@@ -19,7 +19,8 @@ impl Search<'_> {
     pub(super) fn clock(&mut self, view: &View, given: &Misses) -> Result<Option<Tried>> {
         let at = |delay: f64| hypotheses::delayed(view, delay);
         let mut best = (0.0, 0.0);
-        for delay in hypotheses::delays() {
+        let latest = self.few.latest();
+        for delay in hypotheses::delays().into_iter().filter(|d| *d <= latest) {
             let misses = self.few.misses(&at(delay))?;
             let shrinkage = self.settings.shrinkage(given, &misses);
             if shrinkage > best.1 {
@@ -47,9 +48,9 @@ impl Search<'_> {
         Ok(Some(self.judged(hypothesis, given, &misses)))
     }
 
-    /// Whether a clock may have this delay.
+    /// Whether a clock may have this delay. Behind the last reading of a log every delay fits.
     fn is_a_clocks(&self, delay: f64) -> bool {
-        let within = (hypotheses::EARLIEST..=hypotheses::LATEST).contains(&delay);
+        let within = (hypotheses::EARLIEST..=self.few.latest()).contains(&delay);
         within && delay.abs() >= self.settings.delay
     }
 

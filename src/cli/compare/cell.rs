@@ -55,7 +55,7 @@ pub fn run(arm: &Arm, key: &CellKey) -> Result<(Cell, f64)> {
         })
         .transpose()?;
     let ensemble = match &identifier {
-        Some(_) => session.ensemble()?,
+        Some(identifier) => session.ensemble_if(identifier.assumes().scatter)?,
         None => None,
     };
     let solver = (find::<SolverEntry>(&config.solver.name)?.make)(&config.solver.settings)?;

@@ -5,12 +5,12 @@
 
 mod shown;
 
-use crate::pipeline::episode_information_as;
+use crate::pipeline::{episode_information_as, simulated_in};
 use anyhow::Result;
 use asid_algorithms::fisher::FisherSettings;
 use asid_algorithms::identify::expected::ExpectedSettings;
-use asid_core::RealWorld as _;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, find};
+use asid_core::{Model, RealWorld as _};
 
 use super::episodes::{each, open};
 use super::variant::Labels;
@@ -141,7 +141,10 @@ fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
     let truth = session.truth();
     let mut policy = explorer.explore(&problem, None)?.policy;
     let real = session.world(&truth)?.explore(&mut *policy)?;
-    let found = identifier.identify(&problem, std::slice::from_ref(&real.episode))?;
+    let ensemble = session.ensemble_if(identifier.assumes().scatter)?;
+    let models = ensemble.as_ref().map(|e| e as &dyn Model);
+    let episodes = std::slice::from_ref(&real.episode);
+    let found = identifier.identify(&simulated_in(&problem, models), episodes)?;
     // The same settings as in a run.
     let expected = ExpectedSettings {
         assumes: identifier.assumes(),
@@ -149,6 +152,7 @@ fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
     };
     let information = episode_information_as(
         &problem,
+        models,
         &FisherSettings::default(),
         &expected,
         &found.posterior.mean(),

@@ -182,10 +182,10 @@ pub fn relative(deviation: f64, reference: f64) -> String {
 /// Text on an unknown before and after the motion, with the repeats needed for `wanted` percent.
 fn told(u: &UnknownResult, wanted: f64) -> String {
     let to = |deviation: f64| relative(deviation, u.reference);
-    let of = match (u.reference == 0.0, u.value == 0.0) {
-        (true, _) => "",
-        (false, true) => " of the middle of its range",
-        (false, false) => " of its value",
+    let of = if u.value == 0.0 {
+        " of half the width of its range"
+    } else {
+        " of its value"
     };
     let known = match (u.logs, u.both) {
         (Some(logs), Some(both)) => format!(

@@ -7,6 +7,7 @@ use anyhow::Result;
 use asid_algorithms::optimise::GaussNewtonSettings;
 use asid_core::posterior::Direction;
 use asid_core::{Parameter, Streams, Target};
+use asid_diagnosis::intake::Intake;
 use asid_effects::RefinedModel;
 use asid_report::run::{NamedText, RealWorld, RunReport};
 use asid_sysid::dataset::Dataset;
@@ -15,6 +16,7 @@ use asid_sysid::gap::{gap, too_short};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
+use crate::cli::diagnose::machine;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
@@ -79,6 +81,9 @@ pub struct IdentifyResult {
     gap: GapResult,
     logs: Vec<String>,
     held_out: Vec<String>,
+    /// What was left out of the logs, and how their stamps were read where that is in doubt.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    left_out: Vec<String>,
     cost: CostResult,
     versions: Versions,
 }
@@ -120,6 +125,9 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-identify", study.name))?;
     interrupt::watch(&format!("the identification of {}", study.name))?;
     let threads = common.threads.unwrap_or(0);
+    let machine = machine(study, subject.backend.name(), threads)?;
+    let intake = Intake::as_wired(study, &machine)?;
+    let study = &intake.study;
     let progress = Bars::new(common.quiet);
     let data = |logs| Dataset::new(&subject.plant, logs, &study.noise);
     let (train, test) = (data(&study.train)?, data(&study.test)?);
@@ -156,6 +164,7 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         gap,
         logs: names(&study.train),
         held_out: names(&study.test),
+        left_out: intake.lines(),
         cost: CostResult {
             wall_s,
             physics_steps: found.physics_steps,
@@ -173,9 +182,11 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
     let sentence = result.gap.sentence();
     lines.push(sentence.clone());
     lines.extend(caveats.iter().cloned());
+    lines.extend(result.left_out.iter().map(|line| format!("logs: {line}")));
     let mut report = report(&subject, &study.parameters, &found, &config, wall_s);
     report.answer = sentence;
     report.notes = caveats;
+    report.notes.extend(result.left_out.iter().cloned());
     let warning = warning(&result);
     report.notes.extend(warning.clone());
     out.write(|folder| {
@@ -204,7 +215,8 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
 /// Warning of a fit that does not help on logs held out, or that leaves more than noise and
 /// roughness explain.
 fn warning(result: &IdentifyResult) -> Option<String> {
-    if result.gap.identified > result.gap.nominal {
+    // Below the noise one fit is as good as another.
+    if result.gap.identified > result.gap.nominal.max(1.0) {
         return Some(
             "the fitted model replays the logs held out worse than the model as given: something else differs; \
              `asid diagnose` looks for what"

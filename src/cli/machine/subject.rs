@@ -134,6 +134,12 @@ pub fn is_study(path: &Path) -> Result<bool> {
     };
     let table: Result<toml::Table, _> = text.parse();
     Ok(table.map_or(true, |t| {
-        t.contains_key("train") || !t.contains_key("model")
+        // An unknown of a study has a range, a parameter of a refined model a value.
+        let unknowns = t.get("parameter").and_then(toml::Value::as_array);
+        let has_range = |p: &toml::Value| p.get("range").is_some();
+        let of_study = ["train", "test", "noise", "log", "column"];
+        !t.contains_key("model")
+            || of_study.iter().any(|key| t.contains_key(*key))
+            || unknowns.is_some_and(|all| all.iter().any(has_range))
     }))
 }

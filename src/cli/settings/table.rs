@@ -26,16 +26,7 @@ pub fn read_table(path: &Path) -> Result<toml::Table> {
         message,
     };
     let text = std::fs::read_to_string(path).map_err(|e| file(e.to_string()))?;
-    Ok(toml_text::read(&text).map_err(|e| {
-        let line = e.span().map_or(0, |s| line_of(&text, s.start));
-        file(format!("line {line}: {}", e.message()))
-    })?)
-}
-
-/// Number of the line, from 1, that holds the byte at an offset.
-fn line_of(text: &str, offset: usize) -> usize {
-    let before = text.bytes().take(offset);
-    before.filter(|&byte| byte == b'\n').count() + 1
+    Ok(toml_text::read(&text).map_err(|e| file(toml_text::located(&text, &e)))?)
 }
 
 /// The configuration file of a command, or the table that replaces it.
@@ -57,7 +48,7 @@ pub fn given(common: &Common) -> Result<toml::Table> {
 
 /// Deserialises settings into a type that names the keys.
 pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
-    let wrong = |e: toml::de::Error| wrong("--config, --set", e.message().replace('\n', " "));
+    let wrong = |e: toml::de::Error| wrong("--config, --set", toml_text::keyed(&e));
     table.try_into().map_err(wrong)
 }
 
@@ -183,7 +174,5 @@ mod tests {
             let error = read_table(&file).unwrap_err().to_string();
             assert!(error.contains(expected), "{text:?}: {error}");
         }
-        let text = "a\nb\n";
-        assert_eq!([0, 1, 2, 3].map(|at| line_of(text, at)), [1, 1, 2, 2]);
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::{Error, Target, Task};
+use asid_documents::toml_text;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -45,7 +46,7 @@ pub fn unknowns(
     let mut given: BTreeMap<String, ParameterConfig> = BTreeMap::new();
     for (name, value) in table {
         let read = ParameterConfig::deserialize(value.clone())
-            .map_err(|e| wrong(&format!("parameter.{name}"), e.message().to_owned()))?;
+            .map_err(|e| wrong(&format!("parameter.{name}"), toml_text::keyed(&e)))?;
         given.insert(name.clone(), read);
     }
     let mut parameters = task.parameters();

@@ -33,6 +33,17 @@ impl Config {
         if self.task.is_none() && arguments.common.preset.is_some() {
             return Err(wrong("--preset", "goes with a task"));
         }
+        let logs = [
+            ("train", &self.train, !arguments.train.is_empty()),
+            ("test", &self.test, !arguments.test.is_empty()),
+        ];
+        if let Some((key, _, by_option)) = logs.iter().find(|(_, files, _)| !files.is_empty())
+            && self.task.is_none()
+        {
+            let message =
+                "goes with --task: a study names its logs itself, under `train` and `test`";
+            return Err(wrong(&named(key, *by_option), message));
+        }
         if !self.train.is_empty() && self.experiments.is_some_and(|n| n > 0) {
             let key = named("experiments", arguments.experiments.is_some());
             let logs = named("train", !arguments.train.is_empty());

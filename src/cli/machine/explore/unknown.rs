@@ -20,7 +20,7 @@ pub struct UnknownResult {
     pub unit: String,
     /// The value about which the motion was designed.
     pub value: f64,
-    /// What shares are taken of: the value, or the middle of the range where it is zero.
+    /// What shares are taken of: the value, or half the width of the range where it is zero.
     pub reference: f64,
     /// Standard deviations: of the prior, by the logs so far, by this motion, by both.
     pub prior: f64,
@@ -37,10 +37,11 @@ pub struct UnknownResult {
     pub repeats: Option<usize>,
 }
 
-/// Reference of a deviation: the value, or the middle of the range where the value is zero.
+/// Reference of a deviation: the value, or half the width of the range where the value is zero.
 fn reference(parameter: &Parameter, value: f64) -> f64 {
     if value == 0.0 {
-        parameter.center().abs()
+        let [low, high] = parameter.range;
+        (high - low) / 2.0
     } else {
         value.abs()
     }
