@@ -24,8 +24,9 @@ pub struct Method {
 }
 
 /// Predefined methods: the paper's, and the oracle, which shows what a task allows.
-pub const NAMED: [(&str, [&str; 3]); 7] = [
+pub const NAMED: [(&str, [&str; 3]); 8] = [
     ("asid", ["fisher-cem", "reps", "cem"]),
+    ("asid-ppo", ["fisher-ppo", "reps", "cem"]),
     ("asid-estimator", ["fisher-ppo", "estimator", "cem"]),
     ("maxmi", ["maxmi", "estimator", "cem"]),
     ("max", ["max", "reps", "cem"]),

@@ -37,7 +37,7 @@ mod worker;
 pub struct Arguments {
     /// Compare on these tasks [default: all]
     tasks: Vec<String>,
-    /// Method: asid, asid-estimator, maxmi, max, random, dr, oracle (which is told the truth), or
+    /// Method: asid, asid-ppo, asid-estimator, maxmi, max, random, dr, oracle (which is told the truth), or
     /// any other as NAME=explorer+identifier+solver (repeatable) [default: asid, random, dr]
     #[arg(long, value_name = "M")]
     method: Vec<String>,
