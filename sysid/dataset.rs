@@ -56,6 +56,13 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// The noise of each sensor, so that other logs are compared in the same units.
+    #[must_use]
+    pub fn noise(&self) -> BTreeMap<String, f64> {
+        let each = self.signals.iter();
+        each.map(|s| (s.sensor.clone(), s.noise)).collect()
+    }
+
     /// Prepares logs. The noise of a sensor that `noise` does not give is estimated from the logs.
     ///
     /// # Errors

@@ -37,8 +37,9 @@ mod worker;
 pub struct Arguments {
     /// Compare on these tasks [default: all]
     tasks: Vec<String>,
-    /// Method: asid, asid-ppo, asid-estimator, maxmi, max, random, dr, oracle (which is told the truth), or
-    /// any other as NAME=explorer+identifier+solver (repeatable) [default: asid, random, dr]
+    /// Method: asid, asid-ppo, asid-estimator, maxmi, max, random, dr, oracle (which is told the
+    /// truth), or any other as NAME=explorer+identifier+solver (repeatable) [default: asid,
+    /// random, dr]
     #[arg(long, value_name = "M")]
     method: Vec<String>,
     /// Condition of the task, such as left; `prior` draws truths from the whole prior (repeatable)

@@ -226,6 +226,7 @@ fn values_that_differ(written: &PlainModel, exported: &Subject) -> Result<Vec<St
 /// The replay gaps of both models.
 fn gaps(study: &Study, refined: &Subject, exported: &Subject) -> Result<Vec<GapRow>> {
     let mut rows = Vec::new();
+    let noise = Dataset::new(&refined.plant, &study.train, &study.noise)?.noise();
     for (logs, episodes) in [("fitted", &study.train), ("held out", &study.test)] {
         if episodes.is_empty() {
             continue;
@@ -238,7 +239,7 @@ fn gaps(study: &Study, refined: &Subject, exported: &Subject) -> Result<Vec<GapR
                     Ok((name.clone(), with_places(e, from, to)?))
                 })
                 .collect::<Result<_>>()?;
-            let data = Dataset::new(&subject.plant, &episodes, &study.noise)?;
+            let data = Dataset::new(&subject.plant, &episodes, &noise)?;
             Ok(gap(&*subject.model, &[], &[], &data, 0)?.value)
         };
         rows.push(GapRow {

@@ -129,8 +129,8 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
     let intake = Intake::as_wired(study, &machine)?;
     let study = &intake.study;
     let progress = Bars::new(common.quiet);
-    let data = |logs| Dataset::new(&subject.plant, logs, &study.noise);
-    let (train, test) = (data(&study.train)?, data(&study.test)?);
+    let train = Dataset::new(&subject.plant, &study.train, &study.noise)?;
+    let test = Dataset::new(&subject.plant, &study.test, &train.noise())?;
     let found = fit(
         &*subject.model,
         &study.parameters,
