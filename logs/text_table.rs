@@ -17,13 +17,22 @@ const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
 /// Beginning of a comment.
 const COMMENT: char = '#';
 
-/// The text of a file, without a byte order mark, which Excel writes.
+/// The text of a file, without a byte order mark, which Excel writes. Its "Unicode Text" is UTF-16,
+/// which the mark tells.
 ///
 /// # Errors
 /// When the file cannot be read.
 pub fn text(path: &Path) -> Result<String, String> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
-    let text = String::from_utf8_lossy(&bytes);
+    let wide = |unit: fn([u8; 2]) -> u16| {
+        let pairs = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+        String::from_utf16_lossy(&pairs.collect::<Vec<u16>>())
+    };
+    let text = match bytes.get(..2) {
+        Some([0xff, 0xfe]) => wide(u16::from_le_bytes),
+        Some([0xfe, 0xff]) => wide(u16::from_be_bytes),
+        _ => String::from_utf8_lossy(&bytes).into_owned(),
+    };
     Ok(text.trim_start_matches('\u{feff}').to_owned())
 }
 
@@ -292,6 +301,23 @@ mod tests {
         let of = |row: &Row| (columns.clone().map(|i| row.number_in(i).unwrap())).collect();
         let numbers = rows.iter().map(of).collect();
         (numbers, rows.iter().map(|row| row.number).collect())
+    }
+
+    #[test]
+    fn a_byte_order_mark_tells_how_a_file_is_encoded() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("log.csv");
+        let written = "\u{feff}time,Winkel µ\n0,1\n";
+        let wide = |bytes: fn(u16) -> [u8; 2]| written.encode_utf16().flat_map(bytes).collect();
+        for bytes in [
+            written.into(),
+            wide(u16::to_le_bytes),
+            wide(u16::to_be_bytes),
+        ] {
+            let bytes: Vec<u8> = bytes;
+            std::fs::write(&file, bytes).unwrap();
+            assert_eq!(super::text(&file).unwrap(), "time,Winkel µ\n0,1\n");
+        }
     }
 
     #[test]

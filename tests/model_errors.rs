@@ -194,6 +194,8 @@ fn a_run_takes_errors_of_its_model_into_account_and_says_so() {
     );
     let config = place.read("four/config.toml");
     assert!(config.contains("[model_errors]\nmembers = 4"), "{config}");
+    // What a model gets wrong moves many readings together.
+    assert!(config.contains("correlated = true"), "{config}");
     let again = [
         "run",
         "rod-balancing",

@@ -125,6 +125,9 @@ mod with_mcap {
         for file in files {
             logs.extend(Opener::default().open(&file, &settings)?);
         }
+        // A planned motion, such as `next.csv`, has commands and was not recorded.
+        let is_reading = |s: &Series| !s.name.starts_with("ctrl.");
+        logs.retain(|log| log.series.iter().any(is_reading));
         if logs.is_empty() {
             let message = "holds no study.toml and no logs (CSV files): give a study, or the folder of a run or diagnosis";
             return Err(failed(message.into()).into());

@@ -224,8 +224,25 @@ impl Config {
             parameter,
         };
         config.plugins = config.used_plugins();
-        config.learn_from_explorer(&section(&table, "identifier")?);
+        let given = section(&table, "identifier")?;
+        config.learn_from_explorer(&given);
+        config.weigh_jointly_in_an_ensemble(&given);
         Ok((config, parameters))
+    }
+
+    /// Lets an identifier that simulates in several models weigh readings by the whole covariance of
+    /// their scatter, unless the settings say otherwise: an error of a model moves all readings after
+    /// a contact together.
+    fn weigh_jointly_in_an_ensemble(&mut self, given: &toml::Table) {
+        let given = given.get("sampling").and_then(toml::Value::as_table);
+        let is_given = given.is_some_and(|sampling| sampling.contains_key("correlated"));
+        if self.model_errors.members > 0
+            && !is_given
+            && let Some(sampling) = self.identifier.settings.get_mut("sampling")
+            && let Some(correlated) = sampling.get_mut("correlated")
+        {
+            *correlated = true.into();
+        }
     }
 
     /// Lets an identifier that learns from an explorer's episodes learn from this run's explorer,

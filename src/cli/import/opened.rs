@@ -30,6 +30,10 @@ pub(super) fn open(
     let mut all: Vec<Opened> = Vec::new();
     let each = fitted.iter().map(|p| (p, false));
     for (path, test) in each.chain(held_out.iter().map(|p| (p, true))) {
+        if path.to_str().is_none() {
+            let message = "its name is not UTF-8, and study.toml could not hold it: rename it";
+            return Err(failed(path, message));
+        }
         let (file, episode) = asid_logs::open::split(path);
         let kind = LogFormat::of(&file);
         if *settings.kind.get_or_insert(kind) != kind {
