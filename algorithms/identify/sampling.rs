@@ -41,7 +41,8 @@ pub struct SamplingSettings {
     /// Number of posterior samples that are kept.
     pub samples: usize,
     /// Whether readings are weighted by the whole covariance of the roughness along the episode, or
-    /// by its variance alone.
+    /// by its variance alone. Where `model_errors.members` is given, it is true unless it is given
+    /// too.
     pub correlated: bool,
     /// How far the search continues past an end of a prior's range where the posterior piles up, in
     /// widths of the range; 0 keeps it inside.
