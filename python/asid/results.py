@@ -209,7 +209,7 @@ class MotionUnknown(Record):
     prior: float
     """Standard deviations: of the prior, by the logs so far, by this motion, by both."""
     reference: float
-    """What shares are taken of: the value, or the middle of the range where it is zero."""
+    """What shares are taken of: the value, or half the width of the range where it is zero."""
     repeats: int | None
     """Plays of the motion until it is known to the precision asked for, with the logs; null where no number of them suffices."""
     unit: str
@@ -307,6 +307,8 @@ class StudyIdentification(Result):
     seed: int
     study: str
     versions: Versions
+    left_out: list[str] = dataclasses.field(default_factory=list)
+    """What was left out of the logs, and how their stamps were read where that is in doubt."""
     unseen: list[Direction] = dataclasses.field(default_factory=list)
     """Combinations of unknowns that the logs do not see."""
 
