@@ -85,12 +85,30 @@ pub fn inflation(
     Some(&weighed * weighed.transpose() + &projected * projected.transpose() / freedom)
 }
 
+/// `X S^-1 X^T` for `X` of any rows x readings, without negative eigenvalues.
+///
+/// Where the roughness is many times the noise, `S^-1` is a small difference of large numbers, and
+/// rounding may leave an eigenvalue below zero. Such a direction counts as one without information.
+#[must_use]
+pub fn weighed_squares(precision: &Precision, x: &DMatrix<f64>) -> DMatrix<f64> {
+    let squares = precision.weigh(x) * x.transpose();
+    let squares = (&squares + squares.transpose()) * 0.5;
+    let Some(eigen) = symmetric_eigen(squares.clone()) else {
+        return squares;
+    };
+    if eigen.eigenvalues.iter().all(|value| *value >= 0.0) {
+        return squares;
+    }
+    let values = DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| value.max(0.0)));
+    &eigen.eigenvectors * values * eigen.eigenvectors.transpose()
+}
+
 /// Lower factor `L` of the curvature `H = L L^T` that weights imply at slopes `b` (readings x
 /// entries).
 #[must_use]
 pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = b.ncols();
-    let h = precision.weigh(&b.transpose()) * b;
+    let h = weighed_squares(precision, &b.transpose());
     // In standardised coordinates: a direction that the data do not see keeps the region's width.
     // The share of the trace is above the rounding of the sums.
     let ridge = 1e-9 + 1e-12 * h.trace();
@@ -153,6 +171,22 @@ mod tests {
         let spread = DVector::from_vec(vec![0.0, 3.0]);
         let weighed = Precision::diagonal(&spread).weigh(&DMatrix::from_element(1, 2, 1.0));
         assert_eq!(weighed.as_slice(), [1.0, 0.25]);
+    }
+
+    #[test]
+    fn rounding_leaves_no_negative_information() {
+        // Roughness of 1e9 noises along three shapes, in which the rows lie but for one reading each.
+        let shape = |i: usize, k: usize| ((1 + i) as f64 * (0.3 + 0.1 * k as f64)).sin();
+        let epsilon = DMatrix::from_fn(60, 40, |r, k| {
+            let share = |i: usize| ((3 * r + 7 * i) as f64).cos();
+            1e9 * (0..3).map(|i| share(i) * shape(i, k)).sum::<f64>()
+        });
+        let precision = Precision::correlated(&epsilon, 57.0);
+        let rows = DMatrix::from_fn(3, 40, |i, k| 1e9 * shape(i, k));
+        let squares = weighed_squares(&precision, &rows);
+        let eigen = symmetric_eigen(squares).unwrap();
+        let least = eigen.eigenvalues.min();
+        assert!(least >= -1e-12 * eigen.eigenvalues.max(), "{least}");
     }
 
     #[test]

@@ -28,7 +28,7 @@
 //! Where the emulator does not explain the observation within noise and roughness, all is divided
 //! by the mismatch. Points are never selected by how well they fit, which would bias the result.
 
-use crate::fisher::precision::{Precision, implied, inflation, tempered};
+use crate::fisher::precision::{Precision, implied, inflation, tempered, weighed_squares};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 
@@ -147,7 +147,7 @@ impl Emulator {
         } else {
             Precision::diagonal(&spread)
         };
-        let gram = precision.weigh(&a) * a.transpose();
+        let gram = weighed_squares(&precision, &a);
         let mut emulator = Self {
             region: region.clone(),
             widened: gram.clone(),
@@ -329,15 +329,13 @@ impl Emulator {
             .collect();
         let h = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.widened * &slopes[j])));
         let curvature = h + DMatrix::identity(n, n) * REACH.powi(-2);
-        let Some(factor) = curvature
+        let shape = curvature
             .cholesky()
             .map(|c| c.inverse())
             .and_then(|c| c.cholesky())
-        else {
-            return vec![self.region.unstandardise(u); count];
-        };
+            .map_or_else(|| DMatrix::identity(n, n), |factor| factor.l());
         let walk = Walk {
-            shape: factor.l(),
+            shape,
             inside: &|u: &[f64]| self.inside(u),
             loss: &|u: &[f64]| half_square(&self.widened, u),
         };

@@ -25,12 +25,15 @@ const WALKERS: usize = 32;
 const STRETCH: f64 = 2.0;
 /// Halvings of the distance at which a walker begins, until it is inside of the region.
 const HALVINGS: usize = 30;
+/// Directions that are tried at a best point. In a corner of `k` sides one in `2^k` leads inside;
+/// after these the walker begins between the best point and the origin.
+const DIRECTIONS: usize = 8;
 
 /// An ensemble of walkers.
 pub struct Walk<'w> {
     /// Lower triangular factor of the covariance with which the walkers begin.
     pub shape: DMatrix<f64>,
-    /// Whether a point is inside the region.
+    /// Whether a point is inside the region, which is convex and has the origin in its interior.
     pub inside: &'w dyn Fn(&[f64]) -> bool,
     /// Negative log density.
     pub loss: &'w dyn Fn(&[f64]) -> f64,
@@ -72,16 +75,28 @@ impl Walk<'_> {
 
     /// Draws a point inside the region about a point inside.
     fn about(&self, from: &[f64], rng: &mut Rng) -> Vec<f64> {
+        for _ in 0..DIRECTIONS {
+            if let Some(point) = self.beside(from, rng) {
+                return point;
+            }
+        }
+        let share: f64 = rng.random();
+        let between: Vec<f64> = from.iter().map(|x| share * x).collect();
+        self.beside(&between, rng).unwrap_or(between)
+    }
+
+    /// Draws a point inside the region in one direction from a point; `None` if it leads outside.
+    fn beside(&self, from: &[f64], rng: &mut Rng) -> Option<Vec<f64>> {
         let z = DVector::from_fn(from.len(), |_, _| StandardNormal.sample(rng));
         let mut step = &self.shape * z;
         for _ in 0..HALVINGS {
             let point: Vec<f64> = from.iter().zip(&step).map(|(x, s)| x + s).collect();
             if (self.inside)(&point) {
-                return point;
+                return Some(point);
             }
             step *= 0.5;
         }
-        from.to_vec()
+        None
     }
 }
 
@@ -132,6 +147,26 @@ mod tests {
         // Nothing is known: uniform in the box.
         let flat = width(2, &|_| 0.0);
         assert!((flat / 3.0_f64.sqrt() - 1.0).abs() < 0.05, "{flat}");
+    }
+
+    /// Symptom: 1000 equal draws, with a standard deviation of zero. Cause: in a corner of the region
+    /// nearly every direction leads outside, so that all walkers began at the corner itself, and
+    /// moves between equal points lead nowhere.
+    #[test]
+    fn walkers_leave_a_corner() {
+        let walk = Walk {
+            shape: DMatrix::identity(6, 6) * 0.2,
+            inside: &|u: &[f64]| u.iter().all(|x| (-3.0..=0.5).contains(x)),
+            // Exponential densities of width 0.2, which end at the corner.
+            loss: &|u: &[f64]| u.iter().map(|x| (0.5 - x) / 0.2).sum(),
+        };
+        for seed in 0..4 {
+            let drawn = walk.draws(&[0.5; 6], 1000, &mut Streams::new(seed).stream("walk"));
+            for entry in 0..6 {
+                let width = deviation(&drawn, entry);
+                assert!((width / 0.2 - 1.0).abs() < 0.25, "{seed} {entry}: {width}");
+            }
+        }
     }
 
     /// Only the product of two entries is known, to a tenth of the width of the valley.
