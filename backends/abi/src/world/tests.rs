@@ -11,7 +11,7 @@ fn read(inside: &str) -> World {
 
 fn refused(inside: &str) -> String {
     let xml = format!("<mujoco>{inside}</mujoco>");
-    let read = World::read(&Scene::from_xml("test", &xml, &[]).unwrap());
+    let read = Scene::from_xml("test", &xml, &[]).and_then(|scene| World::read(&scene));
     read.err().map(|e| e.to_string()).unwrap_or_default()
 }
 
@@ -354,7 +354,7 @@ fn nonsense_is_refused_with_its_name() {
     for (document, expected) in [
         (
             body("<joint/><geom size='nan'/>"),
-            "geom `geom0` has a size",
+            "line 1: size=\"nan\" is not finite",
         ),
         (body("<joint/><geom/>"), "geom `geom0` needs 1 positive"),
         (
