@@ -40,7 +40,15 @@ const PRESETS: [Preset; 3] = [
             ("sphere-striking", &["in-range", "out-of-range"]),
             ("sphere-patches", &["in-range", "out-of-range"]),
         ],
-        methods: &["random", "maxmi", "dr", "asid-estimator", "asid", "oracle"],
+        methods: &[
+            "random",
+            "maxmi",
+            "dr",
+            "asid-estimator",
+            "asid",
+            "asid-ppo",
+            "oracle",
+        ],
         world: PERTURBED,
     },
     // Rod balancing on a real arm.

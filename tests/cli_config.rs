@@ -55,6 +55,25 @@ fn settings_stand_under_their_meanings_and_follow_the_options() {
 }
 
 #[test]
+fn several_models_identify_where_the_world_deviates_by_chance() {
+    let place = Workplace::new();
+    let perturbed = ["--world", "perturbed"];
+    let as_it_is = ["--set", "model_errors.members=0"];
+    let without_scatter = ["--identifier", "gauss-newton"];
+    for (options, members) in [
+        (vec![], 0),
+        (perturbed.to_vec(), 16),
+        ([perturbed, as_it_is].concat(), 0),
+        ([perturbed, without_scatter].concat(), 0),
+    ] {
+        let page = printed(&place, &[&["rod-balancing"], &options[..]].concat());
+        let settings: Table = page.parse().unwrap();
+        let set = settings["model_errors"]["members"].as_integer();
+        assert_eq!(set, Some(members), "{options:?}");
+    }
+}
+
+#[test]
 fn what_is_printed_for_a_study_is_read_back_as_the_same() {
     let place = Workplace::new();
     place.write("study.toml", "model = \"robot.xml\"\ntrain = [\"*.csv\"]\n");

@@ -31,8 +31,8 @@ const MAX_MEMBERS: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelErrors {
-    /// Models, 4 to 64. 0, the default, for the model as it is; 16 tell the scatter that they cause
-    /// to 18 % of its standard deviation.
+    /// Models, 4 to 64; 0, the default here, for the model as it is. A command takes
+    /// [16](Self::USUAL_MEMBERS) where the real world is not the simulator.
     pub members: usize,
     /// Factor on the time constant of every contact, 1. Default 0.7 to 1.4: a scene's contact
     /// softness is usually chosen and not measured (estimate). 1 is null.
@@ -61,6 +61,10 @@ impl Default for ModelErrors {
 }
 
 impl ModelErrors {
+    /// Members where the simulator is known to deviate: they tell the scatter that they cause to
+    /// 18 % of its standard deviation. In perturbed worlds 64 are no better (docs/identification.md).
+    pub const USUAL_MEMBERS: usize = 16;
+
     /// Reads the errors that a table sets, over the defaults.
     ///
     /// # Errors

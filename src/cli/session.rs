@@ -150,8 +150,8 @@ impl Session {
             return Err(Error::Config {
                 key: format!("{MODEL_ERRORS}.members"),
                 message: format!(
-                    "the identifier {} does not measure how simulations scatter; reps, cem and \
-                     cma-es do",
+                    "the identifier {} does not measure how simulations scatter; set it to 0, or \
+                     identify by reps, cem or cma-es",
                     self.config.identifier.name
                 ),
             }
@@ -179,7 +179,8 @@ impl Session {
         let streams = Streams::new(config.seed).sealed("model errors");
         let made = errors.ensemble(&*backend, &source.scene, given, &self.parameters, streams)?;
         let (ensemble, left_out) = made.unzip();
-        for part in left_out.into_iter().flatten() {
+        let asked_for = left_out.filter(|_| config.members_given);
+        for part in asked_for.into_iter().flatten() {
             failure::warn(&format!("model_errors leaves out {part}"));
         }
         Ok(ensemble)

@@ -6,11 +6,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use asid_core::registry::IdentifierEntry;
 use asid_core::task::Condition;
 use asid_core::{Error, Parameter, Task, registry};
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
-use asid_worlds::{MODEL_ERRORS, ModelErrors};
+use asid_worlds::{MODEL_ERRORS, ModelErrors, WorldKind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -75,6 +76,9 @@ pub struct Config {
     pub expected: ExpectedConfig,
     /// Errors of the simulator that identification takes into account.
     pub model_errors: ModelErrors,
+    /// Whether the settings say how many models there are.
+    #[serde(skip)]
+    pub members_given: bool,
     /// Real world.
     pub real: RealConfig,
     /// How hard the task is, by name.
@@ -181,6 +185,7 @@ impl Config {
         let section_real = section(&table, "real")?;
         let simulator = (&*backend, own_model);
         let real = real::resolve(&section_real, real, task, &parameters, simulator)?;
+        let model_errors = section(&table, MODEL_ERRORS)?;
         let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
         let mut config = Self {
             command: stage,
@@ -216,7 +221,8 @@ impl Config {
                 ASID.solver,
             )?,
             expected: ExpectedConfig::of(&table)?,
-            model_errors: ModelErrors::read(&section(&table, MODEL_ERRORS)?)?,
+            model_errors: ModelErrors::read(&model_errors)?,
+            members_given: model_errors.contains_key("members"),
             real,
             difficulty: difficulty::levels(task, common)?,
             noise: noise(task, &section(&table, "noise")?)?,
@@ -226,8 +232,30 @@ impl Config {
         config.plugins = config.used_plugins();
         let given = section(&table, "identifier")?;
         config.learn_from_explorer(&given);
+        config.expect_model_errors()?;
         config.weigh_jointly_in_an_ensemble(&given);
         Ok((config, parameters))
+    }
+
+    /// Lets the method identify in several models where its simulator is not the real world: in a
+    /// world that deviates by chance, and from logs, which come from anywhere. Only identifiers that
+    /// measure the scatter that models cause do so, and only unless the settings say otherwise.
+    ///
+    /// In a custom world the differences are those that the user named.
+    fn expect_model_errors(&mut self) -> Result<()> {
+        let deviates = match self.command {
+            Stage::Run => !matches!(self.real.world, WorldKind::Matched | WorldKind::Custom),
+            Stage::Identify => true,
+            Stage::Explore | Stage::Solve => false,
+        };
+        if deviates && !self.members_given {
+            let Component { name, settings } = &self.identifier;
+            let identifier = (registry::find::<IdentifierEntry>(name)?.make)(settings)?;
+            if identifier.assumes().scatter {
+                self.model_errors.members = ModelErrors::USUAL_MEMBERS;
+            }
+        }
+        Ok(())
     }
 
     /// Lets an identifier that simulates in several models weigh readings by the whole covariance of
