@@ -2,6 +2,7 @@
 
 mod cut;
 
+use asid_core::layout::reads_forces;
 use asid_core::signal::Signal;
 use asid_core::{Episode, Result};
 use asid_readings::SignalSet;
@@ -34,6 +35,8 @@ pub struct LoggedSensor {
     pub alike: f64,
     /// Whether it reads an orientation.
     pub rotation: bool,
+    /// Whether it reads forces or accelerations, which jump where a command does.
+    pub jumps: bool,
 }
 
 /// One log, prepared for comparison.
@@ -116,6 +119,7 @@ impl Logs {
                 noise: 1.0,
                 alike: 1.0,
                 rotation,
+                jumps: reads_forces(&sensor.kind),
             });
             signals.push(Signal {
                 sensor: name.clone(),
@@ -161,6 +165,16 @@ impl Logs {
     #[must_use]
     pub fn width(&self) -> usize {
         self.differences.width()
+    }
+
+    /// Returns the sensors with their places in a row of readings.
+    pub fn places(&self) -> impl Iterator<Item = (&LoggedSensor, std::ops::Range<usize>)> {
+        let mut next = 0;
+        let lens = self.differences.lens();
+        self.sensors.iter().zip(lens).map(move |(sensor, len)| {
+            next += len;
+            (sensor, next - len..next)
+        })
     }
 
     /// Returns the names of the sensors, as channels of a recording.

@@ -249,8 +249,9 @@ fn import(path: &Path) -> Result<(), String> {
         let proposal = propose(scene, plant, (log, LogFormat::of(path)), &[]).map_err(told)?;
         let mappings = proposal.mappings();
         let [commands, readings] = wanted(&plant.layout, &mappings);
-        let (table, _) = log.table(&commands, &readings);
-        of_table(path, &table, &plant.layout, &mappings).map_err(told)?;
+        let angles = asid_logs::episode::angles(plant, &mappings);
+        let (table, _) = log.table(&commands, &readings, &angles);
+        of_table(path, &table, &plant.layout, (&mappings, &angles)).map_err(told)?;
     }
     Ok(())
 }

@@ -13,9 +13,11 @@ use crate::text_table::{TextTable, text};
 
 /// Reads a file. Cells that are not numbers are missing; columns without any number are left out.
 ///
+/// The stamps are in the column of the name `stamps`, or in the one that looks like it.
+///
 /// # Errors
 /// When the file is no table, its header repeats a name, or it has no column of stamps.
-pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
+pub fn read(path: &Path, name: &str, stamps: Option<&str>) -> Result<RawLog, String> {
     let text = text(path)?;
     let table = TextTable::of(&text)?;
     let mut columns: Vec<Column> = table.header.iter().map(|n| Column::named(n)).collect();
@@ -29,5 +31,5 @@ pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
             column.values.push(number.unwrap_or(f64::NAN));
         }
     }
-    table_file::log(name, &columns)
+    table_file::log(name, &columns, stamps)
 }

@@ -15,6 +15,7 @@ mod parquet;
 mod reader;
 mod remapped;
 mod table;
+mod turns;
 
 use std::path::Path;
 
@@ -25,12 +26,13 @@ use asid_core::{Episode, Error, Result};
 pub use self::parquet::ParquetFile;
 #[cfg(feature = "parquet")]
 pub(crate) use self::parquet::number_in;
-pub use clock::{seconds, stamps_read_as};
+pub use clock::{seconds, stamps_in, stamps_read_as};
 pub use mapping::{ColumnMapping, counts, unit_counts, unit_factor};
 pub use notes::{LogNotes, check_mapped_columns};
 pub use reader::is_of_start;
 pub use remapped::remapped;
 pub use table::{Table, of_table, quantities, wanted};
+pub use turns::{Angle, angles};
 
 use crate::format::LogFormat;
 
@@ -65,10 +67,11 @@ pub fn read_mapped(
     layout: &Layout,
     mappings: &[ColumnMapping],
 ) -> Result<(Episode, LogNotes)> {
-    read_as(LogFormat::of(path), path, layout, mappings)
+    read_as(LogFormat::of(path), path, layout, (mappings, &[]))
 }
 
-/// Reads a log as [`read_mapped`] does, as a Parquet file if that is its kind, else as CSV.
+/// Reads a log as [`read_mapped`] does, as a Parquet file if that is its kind, else as CSV, and
+/// counts the turns of these `angles`.
 ///
 /// # Errors
 /// As [`read_mapped`].
@@ -76,19 +79,19 @@ pub fn read_as(
     kind: LogFormat,
     path: &Path,
     layout: &Layout,
-    mappings: &[ColumnMapping],
+    (mappings, angles): (&[ColumnMapping], &[Angle]),
 ) -> Result<(Episode, LogNotes)> {
     mappings.iter().try_for_each(|m| m.check(layout))?;
     let read = |path: &Path| match kind {
         #[cfg(feature = "parquet")]
-        LogFormat::Parquet => parquet::read(path, layout, mappings),
+        LogFormat::Parquet => parquet::read(path, layout, (mappings, angles)),
         #[cfg(not(feature = "parquet"))]
         LogFormat::Parquet => Err(
             "is a Parquet file, which this build cannot read: build with `--features parquet`, \
                  or convert it to CSV"
                 .to_owned(),
         ),
-        _ => csv::read(path, layout, mappings),
+        _ => csv::read(path, layout, (mappings, angles)),
     };
     read(path).map_err(|message| Error::Log {
         path: path.to_owned(),

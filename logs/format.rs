@@ -76,6 +76,9 @@ pub struct LogSettings {
     /// Topics to read; all if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
+    /// Column of a table's stamps, for an import; a study names it by `[[column]] name = "time"`.
+    #[serde(skip)]
+    pub stamps: Option<String>,
 }
 
 impl LogSettings {

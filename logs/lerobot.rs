@@ -6,9 +6,11 @@
 //! row of the project's own logs.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::Value as Json;
 
 use crate::parquet_file;
@@ -39,7 +41,112 @@ struct Info {
 #[derive(Debug, Deserialize)]
 struct Feature {
     #[serde(default)]
-    names: Json,
+    names: Names,
+}
+
+/// Names of a feature's entries: a list, or lists under headings, in the order of the document.
+#[derive(Debug, Default)]
+enum Names {
+    /// Neither.
+    #[default]
+    None,
+    /// Each entry's name; `None` where it is no text.
+    List(Vec<Option<String>>),
+    /// Headings with what is under each.
+    Headings(Vec<(String, Self)>),
+}
+
+impl<'de> Deserialize<'de> for Names {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Any;
+        impl<'de> Visitor<'de> for Any {
+            type Value = Names;
+
+            fn expecting(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+                out.write_str("names of a feature")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut all: A) -> Result<Names, A::Error> {
+                let mut list = Vec::new();
+                while let Some(entry) = all.next_element::<Json>()? {
+                    list.push(entry.as_str().map(str::to_owned));
+                }
+                Ok(Names::List(list))
+            }
+
+            // A map of JSON values would be in the order of the alphabet.
+            fn visit_map<A: MapAccess<'de>>(self, mut all: A) -> Result<Names, A::Error> {
+                let mut headings = Vec::new();
+                while let Some(heading) = all.next_entry()? {
+                    headings.push(heading);
+                }
+                Ok(Names::Headings(headings))
+            }
+
+            fn visit_unit<E>(self) -> Result<Names, E> {
+                Ok(Names::None)
+            }
+
+            fn visit_str<E>(self, _: &str) -> Result<Names, E> {
+                Ok(Names::None)
+            }
+
+            fn visit_bool<E>(self, _: bool) -> Result<Names, E> {
+                Ok(Names::None)
+            }
+
+            fn visit_i64<E>(self, _: i64) -> Result<Names, E> {
+                Ok(Names::None)
+            }
+
+            fn visit_u64<E>(self, _: u64) -> Result<Names, E> {
+                Ok(Names::None)
+            }
+
+            fn visit_f64<E>(self, _: f64) -> Result<Names, E> {
+                Ok(Names::None)
+            }
+        }
+        deserializer.deserialize_any(Any)
+    }
+}
+
+impl Names {
+    /// The name of each entry, in order.
+    ///
+    /// Entries of one name are told apart by their headings. Where that does not help, and where an
+    /// entry has no text, it has no name.
+    fn of_entries(&self) -> Vec<Option<String>> {
+        let plain = self.flat(false);
+        let repeats = |all: &[Option<String>], name: &Option<String>| {
+            name.is_some() && all.iter().filter(|n| *n == name).count() > 1
+        };
+        let chosen = if plain.iter().any(|name| repeats(&plain, name)) {
+            self.flat(true)
+        } else {
+            plain
+        };
+        let told_apart = |name: &Option<String>| name.clone().filter(|_| !repeats(&chosen, name));
+        chosen.iter().map(told_apart).collect()
+    }
+
+    fn flat(&self, with_headings: bool) -> Vec<Option<String>> {
+        match self {
+            Self::None => Vec::new(),
+            Self::List(list) => list.clone(),
+            Self::Headings(headings) => {
+                let under = |(heading, names): &(String, Self)| {
+                    let name = |name: Option<String>| match name {
+                        Some(name) if with_headings => Some(format!("{heading}.{name}")),
+                        other => other,
+                    };
+                    let names = names.flat(with_headings).into_iter();
+                    names.map(name).collect::<Vec<_>>()
+                };
+                headings.iter().flat_map(under).collect()
+            }
+        }
+    }
 }
 
 /// Reads all episodes of a dataset, in order, each with its number.
@@ -151,21 +258,9 @@ fn feature_name(column: &str, info: &Info) -> String {
     };
     let name = info.features.get(feature).and_then(|f| {
         let entry: usize = entry.parse().ok()?;
-        names(&f.names).get(entry).cloned()
+        f.names.of_entries().get(entry).cloned().flatten()
     });
     name.map_or_else(|| column.to_owned(), |name| format!("{feature}.{name}"))
-}
-
-/// Names of a feature's entries: a list, or lists under headings (`{"motors": [...]}`).
-fn names(json: &Json) -> Vec<String> {
-    match json {
-        Json::Array(all) => {
-            let text = |j: &Json| j.as_str().map(str::to_owned);
-            all.iter().filter_map(text).collect()
-        }
-        Json::Object(headings) => headings.values().flat_map(names).collect(),
-        _ => Vec::new(),
-    }
 }
 
 #[cfg(test)]
@@ -192,6 +287,30 @@ mod tests {
         );
         assert_eq!(feature_name("action.7", &info), "action.7");
         assert_eq!(feature_name("next.reward", &info), "next.reward");
+    }
+
+    /// Symptom: two columns were exchanged, or were one.
+    ///
+    /// Cause: headings were in the order of the alphabet, and equal names were one name.
+    #[test]
+    fn entries_are_in_the_order_of_the_document_and_told_apart() {
+        let names = |text: &str| {
+            let names: Names = serde_json::from_str(text).unwrap();
+            let named = names.of_entries().into_iter();
+            named.map(Option::unwrap_or_default).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            names(r#"{"right": ["pan.pos"], "left": ["gripper.pos"]}"#),
+            ["pan.pos", "gripper.pos"]
+        );
+        assert_eq!(
+            names(r#"{"right": ["pos"], "left": ["pos"]}"#),
+            ["right.pos", "left.pos"]
+        );
+        assert_eq!(names(r#"["pos", "pos", "grip", 3]"#), ["", "", "grip", ""]);
+        for text in ["null", "3", "-2.5", "true", "\"a\"", "[]"] {
+            assert!(names(text).is_empty(), "{text}");
+        }
     }
 
     #[test]

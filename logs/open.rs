@@ -34,9 +34,10 @@ impl Opener {
             return Err(failed("no such file or folder".into()));
         }
         let name = name_of(&file);
+        let stamps = settings.stamps.as_deref();
         match settings.kind_of(&file) {
-            LogFormat::Csv => Ok(vec![csv_file::read(&file, &name).map_err(failed)?]),
-            LogFormat::Parquet => Ok(vec![parquet(&file, &name).map_err(failed)?]),
+            LogFormat::Csv => Ok(vec![csv_file::read(&file, &name, stamps).map_err(failed)?]),
+            LogFormat::Parquet => Ok(vec![parquet(&file, &name, stamps).map_err(failed)?]),
             kind @ (LogFormat::Mcap | LogFormat::Rosbag2) => {
                 let log = ros(&file, kind, &settings.topics, &name);
                 Ok(vec![log.map_err(failed)?])
@@ -101,12 +102,12 @@ fn lacking(what: &str) -> String {
 }
 
 #[cfg(feature = "parquet")]
-fn parquet(file: &Path, name: &str) -> Result<RawLog, String> {
-    crate::parquet_file::read(file, name)
+fn parquet(file: &Path, name: &str, stamps: Option<&str>) -> Result<RawLog, String> {
+    crate::parquet_file::read(file, name, stamps)
 }
 
 #[cfg(not(feature = "parquet"))]
-fn parquet(_: &Path, _: &str) -> Result<RawLog, String> {
+fn parquet(_: &Path, _: &str, _: Option<&str>) -> Result<RawLog, String> {
     Err(lacking("a Parquet file"))
 }
 

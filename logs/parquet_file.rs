@@ -115,11 +115,12 @@ fn number(field: &Field) -> f64 {
     number_in(field).unwrap_or(f64::NAN)
 }
 
-/// Reads a table with any names.
+/// Reads a table with any names, whose stamps are in the column of the name `stamps`, or in the one
+/// that looks like it.
 ///
 /// # Errors
 /// When the file is damaged, or has no column of stamps.
-pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
+pub fn read(path: &Path, name: &str, stamps: Option<&str>) -> Result<RawLog, String> {
     let columns: Vec<Column> = columns(path, false)?
         .into_iter()
         .map(|(name, values)| Column {
@@ -127,5 +128,5 @@ pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
             ..Column::named(&name)
         })
         .collect();
-    table_file::log(name, &columns)
+    table_file::log(name, &columns, stamps)
 }

@@ -177,6 +177,7 @@ pub fn propose(
     Ok(Proposal {
         time: time.map(|stamps| ColumnMapping {
             from: Some(stamps.clone()),
+            unit: log.stamps_unit.map(str::to_owned),
             ..ColumnMapping::of("time")
         }),
         matches,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::align;
-use crate::episode::{LogNotes, Table};
+use crate::episode::{Angle, LogNotes, Table};
 use crate::series::Series;
 
 /// A log of one episode.
@@ -15,6 +15,8 @@ pub struct RawLog {
     pub series: Vec<Series>,
     /// Column of the stamps, for a table.
     pub stamps: Option<String>,
+    /// Unit that the name of this column states.
+    pub stamps_unit: Option<&'static str>,
     /// Columns of a table without any number.
     pub numberless: Vec<Numberless>,
     /// Remarks for the user: streams that could not be read, and why.
@@ -109,14 +111,26 @@ impl RawLog {
 
     /// The series of these names as a table (see [`align`]), and notes of the unused streams.
     ///
-    /// Time counts from the first row.
+    /// Time counts from the first row. The turns of these `angles` are counted before anything is
+    /// interpolated.
     #[must_use]
-    pub fn table(&self, commands: &[String], readings: &[String]) -> (Table, LogNotes) {
+    pub fn table(
+        &self,
+        commands: &[String],
+        readings: &[String],
+        angles: &[Angle],
+    ) -> (Table, LogNotes) {
         let found = |names: &[String]| -> Vec<&Series> {
             let all = names.iter().filter_map(|name| self.series(name));
             all.filter(|s| !s.time.is_empty()).collect()
         };
         let (sent, read) = (found(commands), found(readings));
+        let (counted, turns) = self.with_counted_turns(&read, angles);
+        let read: Vec<&Series> = (read.iter().map(|own| {
+            let counted = counted.iter().find(|s| s.name == own.name);
+            counted.unwrap_or(own)
+        }))
+        .collect();
         let rows = align::rows(if read.is_empty() { &sent } else { &read });
         let mut columns: Vec<(String, Vec<f64>)> = sent
             .iter()
@@ -128,10 +142,27 @@ impl RawLog {
         let names: Vec<&Series> = sent.into_iter().chain(read).collect();
         let notes = LogNotes {
             passed_over: self.passed_over(&names),
+            turns,
             ..LogNotes::default()
         };
         let time = rows.iter().map(|t| t - first).collect();
         (Table { time, columns }, notes)
+    }
+
+    /// Those of some series whose angles jump by a turn, without the jumps, and their sensors with
+    /// the number of jumps.
+    fn with_counted_turns(
+        &self,
+        read: &[&Series],
+        angles: &[Angle],
+    ) -> (Vec<Series>, Vec<(String, usize)>) {
+        let jumping = |angle: &Angle| {
+            let own = read.iter().find(|s| s.name == angle.column)?;
+            let mut series = (*own).clone();
+            let jumps = angle.unwrap_column(&mut series.values);
+            (jumps > 0).then(|| (series, (angle.sensor.clone(), jumps)))
+        };
+        angles.iter().filter_map(jumping).unzip()
     }
 
     /// Streams without a chosen series; for a log that is one table, columns that are not chosen.
@@ -182,7 +213,7 @@ mod tests {
             ],
             ..RawLog::default()
         };
-        let (table, notes) = log.table(&["/b.u".into()], &["/a.x".into(), "absent".into()]);
+        let (table, notes) = log.table(&["/b.u".into()], &["/a.x".into(), "absent".into()], &[]);
         for (t, want) in table.time.iter().zip([0.0, 0.2, 0.4]) {
             assert!((t - want).abs() < 1e-12);
         }

@@ -1,8 +1,9 @@
 //! Converts a table with any names to a log: finds the column of the stamps.
 
-use crate::episode::{seconds, stamps_read_as};
+use crate::episode::{seconds, stamps_in, stamps_read_as};
 use crate::raw::{Numberless, RawLog};
 use crate::series::Series;
+use asid_core::Error;
 
 /// A column of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,37 +48,77 @@ const STAMPS: [&str; 12] = [
     "monotonic",
 ];
 
-/// Rank of a name as a column of stamps, the usual ones lower; `None` for other names.
-fn rank(name: &str) -> Option<usize> {
+/// Words in the names of columns that hold times.
+const WORDS: [&str; 3] = ["time", "clock", "stamp"];
+/// Units that a column of stamps has at the end of its name, as `_ms`, `[ms]` or `(ms)`.
+const UNITS: [(&str, &str); 5] = [
+    ("ns", "ns"),
+    ("us", "us"),
+    ("ms", "ms"),
+    ("s", "s"),
+    ("sec", "s"),
+];
+
+/// A name without the unit at its end, and that unit.
+fn without_unit(name: &str) -> (String, Option<&'static str>) {
     let name = name.to_lowercase();
-    // Remove a unit in brackets, or after an underscore.
-    let bare = name.split(['[', '(']).next().unwrap_or_default().trim();
-    let units = ["_ns", "_us", "_ms", "_s", "_sec"];
-    let plain = units
-        .iter()
-        .find_map(|u| bare.strip_suffix(u))
-        .unwrap_or(bare);
-    let at = |name: &str| STAMPS.iter().position(|s| *s == name);
-    at(bare).or_else(|| at(plain))
+    let known = |text: &str| UNITS.iter().find(|(own, _)| *own == text).map(|u| u.1);
+    if let Some((bare, rest)) = name.split_once(['[', '(']) {
+        let unit = known(rest.trim_end_matches([']', ')', ' ']).trim());
+        return (bare.trim().to_owned(), unit);
+    }
+    match name.rsplit_once('_') {
+        Some((bare, end)) if known(end).is_some() => (bare.to_owned(), known(end)),
+        _ => (name, None),
+    }
 }
 
-/// The column of the stamps: by its name, else the first that strictly increases.
+/// Rank of a name as a column of stamps, the usual ones lower; `None` for other names.
+fn rank(name: &str) -> Option<usize> {
+    let at = |name: &str| STAMPS.iter().position(|s| *s == name);
+    at(&name.to_lowercase()).or_else(|| at(&without_unit(name).0))
+}
+
+/// The column of the stamps: by its name, else the first that strictly increases and whose name
+/// speaks of time, else the first that strictly increases.
 #[must_use]
 pub fn stamps(columns: &[Column]) -> Option<usize> {
     let named = (0..columns.len()).filter_map(|i| Some((rank(&columns[i].name)?, i)));
     let grows = |values: &[f64]| values.len() > 2 && values.windows(2).all(|w| w[1] > w[0]);
-    named
-        .min()
-        .map(|(_, i)| i)
-        .or_else(|| columns.iter().position(|c| grows(&c.values)))
+    let growing = || (0..columns.len()).filter(|i| grows(&columns[*i].values));
+    let of_time = |i: &usize| {
+        let name = columns[*i].name.to_lowercase();
+        WORDS.iter().any(|word| name.contains(word))
+    };
+    // Where no column of these names has a number, its text tells what is wrong.
+    let (empty, named): (Vec<_>, Vec<_>) = named.partition(|(_, i)| columns[*i].is_numberless());
+    let first = |of: Vec<(usize, usize)>| of.into_iter().min().map(|(_, i)| i);
+    first(named)
+        .or_else(|| growing().find(of_time))
+        .or_else(|| first(empty))
+        .or_else(|| growing().next())
 }
 
-/// The log of a table. Columns without a number are left out.
+/// The log of a table, whose stamps are in the column of the `given` name or in the one that is
+/// [found](stamps). Columns without a number are left out.
 ///
 /// # Errors
 /// When no column has stamps, or they are not numbers.
-pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
-    let Some(place) = stamps(columns) else {
+pub fn log(name: &str, columns: &[Column], given: Option<&str>) -> Result<RawLog, String> {
+    let place = match given {
+        Some(given) => Some(
+            columns
+                .iter()
+                .position(|c| c.name == given)
+                .ok_or_else(|| {
+                    let near = Error::nearest(given, columns.iter().map(|c| &*c.name));
+                    let near = near.map_or_else(String::new, |near| format!("; is it `{near}`?"));
+                    format!("has no column `{given}`, which is to hold the stamps{near}")
+                })?,
+        ),
+        None => stamps(columns),
+    };
+    let Some(place) = place else {
         let names: Vec<&str> = columns.iter().take(8).map(|c| &*c.name).collect();
         return Err(format!(
             "has no column of stamps: one named `time`, or one that only grows; its columns are {}",
@@ -89,7 +130,15 @@ pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
         return Err(numberless_stamps(stamps));
     }
     let mut time = stamps.values.clone();
-    let unit = seconds(&mut time);
+    // The unit in its name decides; else that of its rate or date.
+    let stated = without_unit(&stamps.name).1;
+    let guessed = match stated {
+        Some(unit) => {
+            stamps_in(unit, &mut time);
+            None
+        }
+        None => seconds(&mut time),
+    };
     let first = time.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
     time.iter_mut().for_each(|t| *t -= first);
     let others = || {
@@ -107,7 +156,8 @@ pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
             .collect(),
         series: others().filter_map(|c| series(&time, c)).collect(),
         stamps: Some(stamps.name.clone()),
-        remarks: unit.map(stamps_read_as).into_iter().collect(),
+        stamps_unit: stated,
+        remarks: guessed.map(stamps_read_as).into_iter().collect(),
     })
 }
 
@@ -158,7 +208,7 @@ mod tests {
         assert_eq!(stamps(&rows), Some(2));
         assert_eq!(stamps(&rows[..2]), Some(1));
         assert_eq!(stamps(&rows[..1]), None);
-        let log = log("log", &rows).unwrap();
+        let log = log("log", &rows, None).unwrap();
         assert_eq!(log.stamps.as_deref(), Some("Time [ms]"));
         assert_eq!(log.series.len(), 2);
     }
@@ -176,7 +226,7 @@ mod tests {
         for start in [0.0, 1.7e9] {
             let time = column("time", [f64::NAN, start, start + 0.01]);
             let angle = column("angle", [f64::NAN, 1.0, 2.0]);
-            let log = log("log", &[time, angle]).unwrap();
+            let log = log("log", &[time, angle], None).unwrap();
             let [found] = &log.series[..] else {
                 panic!("{:?}", log.series)
             };
@@ -184,6 +234,58 @@ mod tests {
             assert_eq!(found.time[0], 0.0);
             assert!((found.time[1] - 0.01).abs() < 1e-6, "{:?}", found.time);
         }
+    }
+
+    /// Symptom: rows at 2 kHz with `time_ms` were read as rows at 2 Hz, and those of a slow log with
+    /// `time_s` as rows at 1 kHz.
+    ///
+    /// Cause: the unit in the name was only taken off, and the rate decided.
+    #[test]
+    fn the_unit_in_the_name_of_the_stamps_decides() {
+        for (name, values, step, unit) in [
+            ("time_ms", [0.0, 0.5, 1.0], 5e-4, "ms"),
+            ("timestamp_us", [0.0, 250.0, 500.0], 2.5e-4, "us"),
+            ("time_s", [0.0, 1.0, 2.0], 1.0, "s"),
+            ("Time (s)", [5.0, 6.0, 7.0], 1.0, "s"),
+        ] {
+            let time = Column {
+                values: values.to_vec(),
+                ..Column::named(name)
+            };
+            let angle = Column {
+                values: vec![1.0; 3],
+                ..Column::named("angle")
+            };
+            let log = log("log", &[time, angle], None).unwrap();
+            assert_eq!(log.stamps_unit, Some(unit), "{name}");
+            assert!((log.series[0].time[1] - step).abs() < 1e-12, "{name}");
+        }
+    }
+
+    /// Symptom: a counter of frames was the clock beside a column `host_clock_s`, and a column `time`
+    /// of dates kept `elapsed` from being it.
+    #[test]
+    fn a_counter_or_dates_are_no_clock_beside_one() {
+        let column = |name: &str, values: [f64; 3]| Column {
+            values: values.into(),
+            text: "2026-01-01".into(),
+            ..Column::named(name)
+        };
+        let (frame, clock) = (
+            column("frame", [0.0, 1.0, 2.0]),
+            column("host_clock_s", [0.0, 0.02, 0.04]),
+        );
+        let dates = column("time", [f64::NAN; 3]);
+        let elapsed = column("elapsed", [0.0, 0.02, 0.04]);
+        let both = [frame.clone(), clock];
+        assert_eq!(stamps(&both), Some(1));
+        assert_eq!(stamps(&[dates.clone(), elapsed]), Some(1));
+        assert_eq!(stamps(&[dates, frame]), Some(0), "its text is told");
+        // The user has the last word.
+        let given = log("log", &both, Some("frame")).unwrap();
+        assert_eq!(given.stamps.as_deref(), Some("frame"));
+        let said = log("log", &both, Some("host_clock")).unwrap_err();
+        assert!(said.contains("is it `host_clock_s`?"), "{said}");
     }
 
     #[test]
@@ -197,7 +299,7 @@ mod tests {
             column("time", "2026-01-01T10:00:00", f64::NAN),
             column("q", "", 1.0),
         ];
-        let said = log("log", &columns).unwrap_err();
+        let said = log("log", &columns, None).unwrap_err();
         assert!(
             said.contains(
                 "column `time`, the stamps, holds no numbers but text such as `2026-01-01T10:00:00`"

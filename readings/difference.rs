@@ -79,6 +79,12 @@ impl SignalSet {
         Ok(self)
     }
 
+    /// Number of entries of each signal in a reading's row.
+    pub fn lens(&self) -> impl Iterator<Item = usize> + use<> {
+        let lens: Vec<usize> = self.parts.iter().map(|p| p.len).collect();
+        lens.into_iter()
+    }
+
     /// Number of entries of a reading's row.
     #[must_use]
     pub fn width(&self) -> usize {

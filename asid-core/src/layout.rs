@@ -108,6 +108,25 @@ pub fn sensor_unit(kind: &str) -> &'static str {
     }
 }
 
+/// Whether a sensor of this kind reads forces or accelerations, which jump where a command does.
+#[must_use]
+pub fn reads_forces(kind: &str) -> bool {
+    matches!(
+        kind,
+        "accelerometer"
+            | "framelinacc"
+            | "frameangacc"
+            | "force"
+            | "torque"
+            | "touch"
+            | "actuatorfrc"
+            | "jointactuatorfrc"
+            | "tendonactuatorfrc"
+            | "jointlimitfrc"
+            | "tendonlimitfrc"
+    )
+}
+
 /// Number of entries of a sensor of this kind.
 #[must_use]
 pub fn sensor_len(kind: &str) -> usize {

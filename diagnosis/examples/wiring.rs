@@ -257,7 +257,7 @@ fn remapped(
     layout: &Layout,
     mappings: &[ColumnMapping],
 ) -> Result<Episode, asid::core::Error> {
-    let mut spoilt = episode::remapped(episode, layout, mappings)?;
+    let mut spoilt = episode::remapped(episode, layout, (mappings, &[]))?;
     let width = spoilt.width();
     let late = mappings.iter().map(|m| -m.delay).fold(0.0, f64::max);
     for k in 0..spoilt.rows() {

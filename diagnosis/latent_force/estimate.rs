@@ -160,7 +160,7 @@ impl Estimate {
     pub fn improve(&mut self, context: &Context<'_>, linear: &[LinearEpisode], rounds: usize) {
         let starts = context.starts(&self.trajectory, &self.read);
         let mut length = LENGTHENED;
-        let mut before = (f64::NEG_INFINITY, self.noise.clone());
+        let mut before = (f64::NEG_INFINITY, self.noise.clone(), self.excess.clone());
         for round in 0..rounds.max(1) {
             let smoothed: Vec<Smoothed> = self
                 .problems(context, linear, &starts)
@@ -175,13 +175,13 @@ impl Estimate {
             let likelihood: f64 = smoothed.iter().map(|s| s.log_likelihood).sum();
             if likelihood.is_nan() || likelihood < before.0 {
                 // A lengthened step went too far.
-                self.noise = before.1.clone();
+                (self.noise, self.excess) = (before.1.clone(), before.2.clone());
                 length = 1.0;
                 continue;
             }
             self.log_likelihood = likelihood;
             self.smoothed = smoothed;
-            before = (likelihood, self.noise.clone());
+            before = (likelihood, self.noise.clone(), self.excess.clone());
             if round + 1 < rounds {
                 self.update_noise(context, &sums, length);
                 self.update_excess(context);

@@ -129,10 +129,9 @@ pub fn from_readings(
 
 /// Returns some channels of the readings along a walk, one after the other.
 fn series(logs: &Logs, walk: &Walk, channels: Range<usize>) -> Vec<Vec<f64>> {
-    let readings = &logs.episodes[walk.episode].readings;
     let channel = |c: usize| {
-        let row = |k: &usize| readings[k * logs.width() + c];
-        walk.rows.iter().map(row).collect()
+        let row = |k: usize| walk.readings(logs, k)[c];
+        (0..walk.len()).map(row).collect()
     };
     channels.map(channel).collect()
 }

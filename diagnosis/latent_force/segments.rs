@@ -192,6 +192,7 @@ mod tests {
             time: (0..rows).map(|k| 0.01 * k as f64).collect(),
             substeps: vec![5; rows - 1],
             ctrl: Vec::new(),
+            at_steps: Vec::new(),
             segment: None,
         }
     }

@@ -93,9 +93,17 @@ impl<'a> StepMap<'a> {
         let names = layout.state_channels();
         let (mut depends_on_past, mut remembers_readings) = (model.remembers_commands(), false);
         let (mut in_each_step, mut on_readings) = (Vec::new(), Vec::new());
+        let mut late = vec![false; logs.entries.len()];
         for spec in machine.given_effects().iter().chain(specs) {
             let effect = spec.find(&machine.plant)?;
-            remembers_readings |= effect.remembers_readings();
+            if effect.remembers_readings() {
+                remembers_readings = true;
+                for (late, entry) in late.iter_mut().zip(&logs.entries) {
+                    // Without a site it is an effect on all sensors.
+                    let sensor = &logs.sensors[entry.sensor].name;
+                    *late |= spec.site.is_empty() || spec.site == *sensor;
+                }
+            }
             depends_on_past |= effect.acts() != Acts::Model;
             if matches!(effect.acts(), Acts::Model | Acts::Measurement) {
                 in_each_step.push(spec.label());
@@ -124,6 +132,7 @@ impl<'a> StepMap<'a> {
             capacity,
             depends_on_past,
             remembers_readings,
+            late,
             alters_readings: !on_readings.is_empty(),
             one_step: false,
             at_once: parameters.iter().map(acts_at_once).collect(),

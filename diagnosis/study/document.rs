@@ -153,7 +153,7 @@ impl Study {
         document.check_noise(&plant.layout, &fail)?;
         document.check_columns(&plant, &fail)?;
         let mut notes = Vec::new();
-        let mut logs = files::Logs::new(&folder, &plant.layout, &document.column, &document.log);
+        let mut logs = files::Logs::new(&folder, &plant, &document.column, &document.log);
         let mut read = |patterns: &[String], key: &str| -> Result<Vec<(String, Episode)>> {
             let read = logs.read(patterns, key);
             let read = read.map_err(|e| of_file(e, &fail))?;

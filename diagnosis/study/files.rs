@@ -2,15 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use asid_core::{Episode, Error, Layout, Result};
-use asid_logs::episode::{ColumnMapping, LogNotes, of_table, read_as, wanted};
+use asid_core::{Episode, Error, Result};
+use asid_logs::episode::{Angle, ColumnMapping, LogNotes, angles, of_table, read_as, wanted};
 use asid_logs::{LogSettings, Opener};
+use asid_mjcf::Plant;
 
 /// Reads the logs of a study.
 pub(super) struct Logs<'a> {
     folder: &'a Path,
-    layout: &'a Layout,
+    plant: &'a Plant,
     columns: &'a [ColumnMapping],
+    angles: Vec<Angle>,
     settings: &'a LogSettings,
     opener: Opener,
 }
@@ -21,14 +23,15 @@ type Read = (String, Episode, LogNotes);
 impl<'a> Logs<'a> {
     pub(super) fn new(
         folder: &'a Path,
-        layout: &'a Layout,
+        plant: &'a Plant,
         columns: &'a [ColumnMapping],
         settings: &'a LogSettings,
     ) -> Self {
         Self {
             folder,
-            layout,
+            plant,
             columns,
+            angles: angles(plant, columns),
             settings,
             opener: Opener::default(),
         }
@@ -75,19 +78,22 @@ impl<'a> Logs<'a> {
         };
         // An episode of a dataset (`dataset#3`) is not a file of its own.
         let (at, _) = asid_logs::open::split(file);
+        let layout = &self.plant.layout;
+        let columns = (self.columns, &self.angles[..]);
         let kind = self.settings.kind_of(&at);
         if kind.is_table() {
-            let (episode, notes) = read_as(kind, file, self.layout, self.columns)?;
+            let (episode, notes) = read_as(kind, file, layout, columns)?;
             return Ok(vec![(name(file), episode, notes)]);
         }
         let logs = self.opener.open(file, self.settings)?;
-        let [commands, readings] = wanted(self.layout, self.columns);
+        let [commands, readings] = wanted(layout, self.columns);
         let several = logs.len() > 1;
         let one = |log: asid_logs::RawLog| {
-            let (table, streams) = log.table(&commands, &readings);
-            let (episode, mut notes) = of_table(file, &table, self.layout, self.columns)?;
+            let (table, streams) = log.table(&commands, &readings, &self.angles);
+            let (episode, mut notes) = of_table(file, &table, layout, columns)?;
             notes.passed_over = streams.passed_over;
             notes.remarks = log.remarks;
+            notes.turns.extend(streams.turns);
             let name = if several {
                 let parent = file.parent().unwrap_or(Path::new(""));
                 name(&parent.join(&log.name))

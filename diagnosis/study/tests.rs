@@ -117,7 +117,7 @@ fn a_further_mapping_is_composed_with_that_of_its_vector_and_of_its_entries() {
             columns.extend(composed);
             let log = folder.path().join("a.csv");
             let (found, _) = read_mapped(&log, &layout, &columns).unwrap();
-            let wanted = remapped(&study.train[0].1, &layout, &further).unwrap();
+            let wanted = remapped(&study.train[0].1, &layout, (&further, &[])).unwrap();
             assert_eq!(found.channels, wanted.channels);
             for (x, y) in found.readings.iter().zip(&wanted.readings) {
                 let same = (x - y).abs() < 1e-12 || (x.is_nan() && y.is_nan());

@@ -2,7 +2,8 @@
 
 use asid_core::parameter::Scale;
 use asid_core::{Layout, Parameter, Result, Target};
-use asid_logs::episode::{ColumnMapping, remapped};
+use asid_logs::episode::{ColumnMapping, angles, remapped};
+use asid_mjcf::Plant;
 use asid_mjcf::plant::DriveLaw;
 
 use crate::machine::Machine;
@@ -181,8 +182,9 @@ fn dampings(machine: &Machine, parameters: &[Parameter]) -> Result<Vec<Parameter
 /// # Errors
 /// When a mapping does not fit the logs.
 pub fn apply(study: &mut Study, layout: &Layout, mappings: &[ColumnMapping]) -> Result<()> {
+    let angles = angles(&Plant::of(&study.scene)?, &[]);
     for (_, episode) in study.train.iter_mut().chain(&mut study.test) {
-        *episode = remapped(episode, layout, mappings)?;
+        *episode = remapped(episode, layout, (mappings, &angles))?;
     }
     Ok(())
 }

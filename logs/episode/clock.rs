@@ -91,6 +91,13 @@ pub fn seconds(stamps: &mut [f64]) -> Option<&'static str> {
     notes.time_unit
 }
 
+/// Converts stamps of a known unit to seconds; dates are counted from the first.
+pub fn stamps_in(unit: &str, stamps: &mut [f64]) {
+    let length = STAMPS.iter().find(|(name, _)| *name == unit);
+    let length = length.map_or(1.0, |(_, length)| *length);
+    to_seconds(stamps, Some(length), &mut LogNotes::default());
+}
+
 /// Order of the rows in time: late arrivals are sorted, and the last of rows with one stamp is
 /// kept.
 ///

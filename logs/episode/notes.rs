@@ -28,6 +28,8 @@ pub struct LogNotes {
     pub reordered: usize,
     /// Missing commands, filled in from the row before.
     pub held: usize,
+    /// Sensors whose angles jumped by a turn, with the number of jumps that were taken out.
+    pub turns: Vec<(String, usize)>,
     /// Remarks of readers of other stacks' files: unreadable streams, disagreeing clocks.
     pub remarks: Vec<String>,
 }
@@ -107,6 +109,11 @@ impl LogNotes {
             if count > 0 {
                 all.push(format!("{count} {what}"));
             }
+        }
+        for (sensor, jumps) in &self.turns {
+            all.push(format!(
+                "the angle `{sensor}` jumped by a turn {jumps} times, as one that is reported within one turn: its turns are counted"
+            ));
         }
         all.extend(self.remarks.iter().cloned());
         all

@@ -15,28 +15,28 @@ use parquet::record::Field;
 pub use file::ParquetFile;
 
 use super::reader::Reader;
-use super::{ColumnMapping, LogNotes};
+use super::{Angle, ColumnMapping, LogNotes};
 
 /// Reads a Parquet file.
 pub(super) fn read(
     path: &Path,
     layout: &Layout,
-    mappings: &[ColumnMapping],
+    columns: (&[ColumnMapping], &[Angle]),
 ) -> Result<(Episode, LogNotes), String> {
-    guarded("a Parquet file", || read_rows(path, layout, mappings))
+    guarded("a Parquet file", || read_rows(path, layout, columns))
 }
 
 fn read_rows(
     path: &Path,
     layout: &Layout,
-    mappings: &[ColumnMapping],
+    columns: (&[ColumnMapping], &[Angle]),
 ) -> Result<(Episode, LogNotes), String> {
     let told = |e: parquet::errors::ParquetError| one_line(&e.to_string());
     let file = ParquetFile::open(path)?;
     let schema = file.metadata().file_metadata().schema_descr();
     let fields = schema.root_schema().get_fields().iter();
     let header = fields.map(|f| f.name().to_owned()).collect();
-    let mut reader = Reader::new(layout, mappings, header)?;
+    let mut reader = Reader::new(layout, columns, header)?;
     for (i, row) in file.get_row_iter(None).map_err(told)?.enumerate() {
         let row = row.map_err(|e| format!("row {}: {}", i + 2, told(e)))?;
         let fields: Vec<&Field> = row.get_column_iter().map(|(_, field)| field).collect();
@@ -126,7 +126,7 @@ mod tests {
         let other = folder.path().join("log.pq");
         std::fs::rename(folder.path().join("log.parquet"), &other).unwrap();
         let (other, _) =
-            crate::episode::read_as(LogFormat::Parquet, &other, &layout(), &[]).unwrap();
+            crate::episode::read_as(LogFormat::Parquet, &other, &layout(), (&[], &[])).unwrap();
         assert_eq!((&other.time, &other.ctrl), (&a.time, &a.ctrl));
     }
 

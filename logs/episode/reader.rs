@@ -6,6 +6,7 @@ use asid_core::{Error, Result};
 
 use super::mapping::{ColumnMapping, Source};
 use super::notes::LogNotes;
+use super::turns::Angle;
 use super::{clock, delay};
 
 /// A column of the log, and the conversion of its numbers to a quantity.
@@ -20,6 +21,7 @@ struct Column {
 /// A log while it is read, row by row.
 pub(super) struct Reader<'a> {
     layout: &'a Layout,
+    angles: &'a [Angle],
     header: Vec<String>,
     time: usize,
     /// Factor of the stamps to seconds, if the study states their unit.
@@ -65,7 +67,7 @@ impl<'a> Reader<'a> {
     /// Finds the columns of all quantities.
     pub(super) fn new(
         layout: &'a Layout,
-        mappings: &[ColumnMapping],
+        (mappings, angles): (&[ColumnMapping], &'a [Angle]),
         header: Vec<String>,
     ) -> Result<Self, String> {
         let column = |name: &str| header.iter().position(|h| h == name);
@@ -135,6 +137,7 @@ impl<'a> Reader<'a> {
         }
         Ok(Self {
             layout,
+            angles,
             time,
             time_factor,
             ctrl,
@@ -241,11 +244,35 @@ impl<'a> Reader<'a> {
             })?;
             self.notes.held += held;
         }
+        self.notes.turns = count_turns(episode, self.angles);
         let delays = |columns: &[Column]| columns.iter().map(|c| c.delay).collect::<Vec<_>>();
         delay::readings(episode, self.layout, &delays(&self.readings));
         delay::commands(episode, &delays(&self.ctrl));
         Ok((self.episode, self.notes))
     }
+}
+
+/// Counts the turns of angles that are reported within one, and returns the sensors with their jumps.
+pub(super) fn count_turns(episode: &mut Episode, angles: &[Angle]) -> Vec<(String, usize)> {
+    let width = episode.width();
+    let mut found = Vec::new();
+    let mut at = 0;
+    for channel in &episode.channels {
+        let place = at;
+        at += channel.len;
+        let Some(angle) = angles.iter().find(|a| a.sensor == channel.name) else {
+            continue;
+        };
+        let column = episode.readings.iter().skip(place).step_by(width);
+        let mut values: Vec<f64> = column.copied().collect();
+        let jumps = angle.unwrap_readings(&mut values);
+        if jumps > 0 {
+            let cells = episode.readings.iter_mut().skip(place).step_by(width);
+            cells.zip(values).for_each(|(cell, x)| *cell = x);
+            found.push((channel.name.clone(), jumps));
+        }
+    }
+    found
 }
 
 /// Fills in the missing commands of one actuator, and returns their number; `None` if all are

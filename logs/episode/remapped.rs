@@ -4,16 +4,22 @@ use asid_core::layout::Layout;
 use asid_core::{Episode, Result};
 
 use super::mapping::{ColumnMapping, Source};
+use super::reader::count_turns;
+use super::turns::Angle;
 use super::{delay, entry_name};
 
 /// The log with other mappings of its columns.
 ///
 /// Factor, offset and delay of the mappings apply to the quantities as they were read, and `from`
-/// names the quantity that a column holds.
+/// names the quantity that a column holds. The turns of these `angles` are counted.
 ///
 /// # Errors
 /// When a mapping names something that the scene does not have.
-pub fn remapped(episode: &Episode, layout: &Layout, mappings: &[ColumnMapping]) -> Result<Episode> {
+pub fn remapped(
+    episode: &Episode,
+    layout: &Layout,
+    (mappings, angles): (&[ColumnMapping], &[Angle]),
+) -> Result<Episode> {
     mappings.iter().try_for_each(|m| m.check(layout))?;
     let mut out = episode.clone();
     let width = episode.width();
@@ -49,6 +55,7 @@ pub fn remapped(episode: &Episode, layout: &Layout, mappings: &[ColumnMapping]) 
         }
         commands.push(source.delay);
     }
+    count_turns(&mut out, angles);
     delay::readings(&mut out, layout, &late);
     delay::commands(&mut out, &commands);
     Ok(out)

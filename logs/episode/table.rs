@@ -10,7 +10,7 @@ use asid_core::{Episode, Error, Result};
 
 use super::mapping::Source;
 use super::reader::Reader;
-use super::{ColumnMapping, LogNotes, entry_name};
+use super::{Angle, ColumnMapping, LogNotes, entry_name};
 
 /// Columns of numbers over time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,13 +52,13 @@ pub fn of_table(
     path: &Path,
     table: &Table,
     layout: &Layout,
-    mappings: &[ColumnMapping],
+    (mappings, angles): (&[ColumnMapping], &[Angle]),
 ) -> Result<(Episode, LogNotes)> {
     mappings.iter().try_for_each(|m| m.check(layout))?;
     let read = || -> Result<(Episode, LogNotes), String> {
         let names = table.columns.iter().map(|(name, _)| name.clone());
         let header = std::iter::once("time".to_owned()).chain(names).collect();
-        let mut reader = Reader::new(layout, mappings, header)?;
+        let mut reader = Reader::new(layout, (mappings, angles), header)?;
         // The stamps are already in seconds.
         reader.time_factor = Some(1.0);
         for (row, time) in table.time.iter().enumerate() {
@@ -104,7 +104,7 @@ mod tests {
                 ("ctrl.servo".into(), vec![1.0, nan, 3.0]),
             ],
         };
-        let (of_table, _) = of_table(&path, &table, &layout(), &[]).unwrap();
+        let (of_table, _) = of_table(&path, &table, &layout(), (&[], &[])).unwrap();
         assert_eq!(
             (&of_table.time, &of_table.ctrl),
             (&from_csv.time, &from_csv.ctrl)

@@ -140,7 +140,7 @@ fn a_delayed_command_keeps_its_integral() {
         delay: 0.025,
         ..ColumnMapping::of("ctrl.servo")
     };
-    let late = remapped(&episode, &layout(), &[delay]).unwrap();
+    let late = remapped(&episode, &layout(), (&[delay], &[])).unwrap();
     // Command k / 7 in row k: the first step arrives in the middle of row 9.
     for (got, want) in late.ctrl[8..11].iter().zip([0.0, 0.5, 1.0]) {
         assert!((got - want).abs() < 1e-9, "{got} {want}");
@@ -165,7 +165,10 @@ fn a_mapping_of_an_episode_is_the_mapping_of_its_file() {
     ];
     let (of_file, _) = read_text(&text, &mappings).unwrap();
     let (plain, _) = read_text(&text, &[]).unwrap();
-    assert_same(&remapped(&plain, &layout(), &mappings).unwrap(), &of_file);
+    assert_same(
+        &remapped(&plain, &layout(), (&mappings, &[])).unwrap(),
+        &of_file,
+    );
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::definition::{Count, Definition, Field, Kind, Primitive};
 /// Longest list of numbers that is kept.
 ///
 /// Joints, poses and covariances are shorter; images, scans and clouds are longer.
-const LONGEST_LIST: usize = 512;
+pub(super) const LONGEST_LIST: usize = 512;
 
 /// A decoded value.
 #[derive(Clone, Debug, PartialEq)]

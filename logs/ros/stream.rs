@@ -34,6 +34,27 @@ struct Stamps {
     own: Option<i64>,
 }
 
+/// The clock whose stamps count.
+#[derive(Clone, Copy, Debug)]
+enum Clock {
+    /// The recorder's.
+    Recorder,
+    /// The messages' own. One without a stamp was recorded this long (ns) before its time.
+    Own { apart: i64 },
+}
+
+impl Clock {
+    fn stamp(self, stamps: Stamps) -> i64 {
+        match self {
+            Self::Recorder => stamps.recorded,
+            Self::Own { apart } => {
+                let placed = stamps.recorded.saturating_add(apart);
+                stamps.own.unwrap_or(placed)
+            }
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     message: u32,
@@ -53,9 +74,19 @@ pub struct Stream {
 impl Stream {
     /// Adds a message that was recorded at a time, ns.
     pub fn push(&mut self, topic: &str, recorded: i64, message: &Value) {
-        let own = message.field("header").and_then(|h| h.field("stamp"));
-        let own = own.and_then(nanoseconds).filter(|t| *t != 0);
+        let own = stamp(message, recorded);
         let mut path = topic.to_owned();
+        if let Some((name, entries)) = stamped_entries(message, recorded) {
+            for (i, entry) in entries.iter().enumerate() {
+                let own = stamp(entry, recorded);
+                self.begin(Stamps { recorded, own });
+                let entry_name = own_name(entry).unwrap_or(i.to_string());
+                within(&mut path, name, |path| {
+                    within(path, &entry_name, |path| self.flatten(path, entry, None));
+                });
+            }
+            return;
+        }
         if let (Some(Value::List(points)), Some(names)) =
             (message.field("points"), message.field("joint_names"))
         {
@@ -146,42 +177,47 @@ impl Stream {
         }
     }
 
-    /// Whether the messages' own stamps are on the recorder's clock; a remark if not.
-    fn own_clock(&self, topic: &str) -> (bool, Option<String>) {
+    /// The clock that counts, and a remark where it is not that of all messages' own stamps.
+    fn clock(&self, topic: &str) -> (Clock, Option<String>) {
         let apart = |s: &Stamps| Some(s.own?.saturating_sub(s.recorded));
         let mut apart: Vec<i64> = self.stamps.iter().filter_map(apart).collect();
-        if apart.is_empty() || apart.len() < self.stamps.len() {
-            return (false, None);
+        let (stamped, all) = (apart.len(), self.stamps.len());
+        if apart.is_empty() {
+            return (Clock::Recorder, None);
         }
-        let middle = apart.len() / 2;
-        let median = *apart.select_nth_unstable(middle).1 as f64 / SECOND;
-        if median.abs() < SAME_CLOCK {
-            return (true, None);
+        let middle = stamped / 2;
+        let median = *apart.select_nth_unstable(middle).1;
+        let seconds = median as f64 / SECOND;
+        if seconds.abs() >= SAME_CLOCK {
+            let remark = format!(
+                "{topic}: its own stamps are {seconds:.3} s from the recorder's clock; the recorder's are used"
+            );
+            return (Clock::Recorder, Some(remark));
         }
+        let lacking = all - stamped;
         let remark = format!(
-            "{topic}: its own stamps are {median:.3} s from the recorder's clock; the recorder's are used"
+            "{topic}: {lacking} of {all} messages have no stamp of their own; they are placed {seconds:.3} s from the recorder's, as the others are"
         );
-        (false, Some(remark))
+        (
+            Clock::Own { apart: median },
+            (lacking > 0).then_some(remark),
+        )
     }
 
     /// Earliest of the stamps that count, ns.
     #[must_use]
     pub fn first(&self) -> Option<i64> {
-        let own = self.own_clock("").0;
-        let stamps = self.stamps.iter();
-        stamps
-            .map(|s| s.own.filter(|_| own).unwrap_or(s.recorded))
-            .min()
+        let clock = self.clock("").0;
+        self.stamps.iter().map(|s| clock.stamp(*s)).min()
     }
 
     /// The series in order of time, counted from `start` (ns), and a remark.
     #[must_use]
     pub fn series(self, topic: &str, start: i64) -> (Vec<Series>, Option<String>) {
-        let (own, remark) = self.own_clock(topic);
+        let (clock, remark) = self.clock(topic);
         let mut points: Vec<Vec<(i64, f64)>> = vec![Vec::new(); self.names.len()];
         for s in &self.samples {
-            let stamps = self.stamps[s.message as usize];
-            let stamp = stamps.own.filter(|_| own).unwrap_or(stamps.recorded);
+            let stamp = clock.stamp(self.stamps[s.message as usize]);
             points[s.column as usize].push((stamp, s.value));
         }
         let series = self
@@ -219,6 +255,28 @@ fn within(path: &mut String, name: &str, run: impl FnOnce(&mut String)) {
     path.push_str(name);
     run(path);
     path.truncate(length);
+}
+
+/// The stamp in a record's header; `None` where it has none, or where it is 0 long after the
+/// recorder's clock was.
+fn stamp(record: &Value, recorded: i64) -> Option<i64> {
+    let stamp = record.field("header").and_then(|h| h.field("stamp"));
+    let began = (recorded as f64).abs() < SAME_CLOCK * SECOND;
+    stamp.and_then(nanoseconds).filter(|t| *t != 0 || began)
+}
+
+/// The list of a message that only holds one, of records with headers of their own (`TFMessage`).
+fn stamped_entries(message: &Value, recorded: i64) -> Option<(&str, &[Value])> {
+    let Value::Record(fields) = message else {
+        return None;
+    };
+    match &fields[..] {
+        [(name, Value::List(entries))] => {
+            let all_stamped = entries.iter().all(|e| stamp(e, recorded).is_some());
+            (all_stamped && !entries.is_empty()).then_some((&**name, &entries[..]))
+        }
+        _ => None,
+    }
 }
 
 fn own_name(record: &Value) -> Option<String> {
@@ -303,6 +361,55 @@ mod tests {
         let (series, remark) = stream.series("/t", NOW);
         assert!(remark.unwrap().contains("recorder"));
         assert_eq!(series[0].time, [0.0, 0.002, 0.004]);
+    }
+
+    /// Symptom: the readings of a whole topic were late by the time that a message takes.
+    ///
+    /// Cause: the first message had no stamp, so that the recorder's clock was taken for all, without
+    /// a word.
+    #[test]
+    fn a_message_without_a_stamp_leaves_the_others_theirs() {
+        let (second, late) = (1_000_000_000, 40_000_000);
+        let mut stream = Stream::default();
+        for k in 0..5 {
+            let own = if k == 0 { 0 } else { NOW + k * second };
+            let message = Value::Record(vec![header(own), ("x".into(), Value::Number(k as f64))]);
+            stream.push("/t", NOW + k * second + late, &message);
+        }
+        let (series, remark) = stream.series("/t", NOW);
+        assert_eq!(series[0].time, [0.0, 1.0, 2.0, 3.0, 4.0]);
+        assert!(remark.unwrap().contains("1 of 5 messages"));
+    }
+
+    /// Symptom: poses of `/tf` were at the recorder's stamps.
+    ///
+    /// Cause: each transform has a header of its own, and only one of the message was looked for.
+    #[test]
+    fn transforms_have_stamps_of_their_own() {
+        let transform = |name: &str, ns: i64, x: f64| {
+            Value::Record(vec![
+                header(ns),
+                ("child_frame_id".into(), Value::Text(name.into())),
+                ("x".into(), Value::Number(x)),
+            ])
+        };
+        let mut stream = Stream::default();
+        let (second, late) = (1_000_000_000, 40_000_000);
+        for k in 0..3 {
+            let at = NOW + k * second;
+            let both = vec![
+                transform("tool", at, k as f64),
+                transform("cup", at + late / 2, -k as f64),
+            ];
+            let message = Value::Record(vec![("transforms".into(), Value::List(both))]);
+            stream.push("/tf", at + late, &message);
+        }
+        assert_eq!(stream.first(), Some(NOW));
+        let (series, remark) = stream.series("/tf", NOW);
+        assert!(remark.is_none());
+        assert_eq!(series[0].name, "/tf.transforms.tool.x");
+        assert_eq!(series[0].time, [0.0, 1.0, 2.0]);
+        assert_eq!(series[1].time, [0.02, 1.02, 2.02]);
     }
 
     #[test]

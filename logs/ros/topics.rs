@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value as Json;
 
-use super::cdr::{Value, decode};
+use super::cdr::{LONGEST_LIST, Value, decode};
 use super::definition::Definition;
 use super::stream::Stream;
 use crate::raw::RawLog;
@@ -176,6 +176,7 @@ fn of_json(json: Json, depth: usize) -> Value {
         Json::Bool(x) => Value::Number(f64::from(u8::from(x))),
         Json::Number(x) => x.as_f64().map_or(Value::Skipped, Value::Number),
         Json::String(text) => Value::Text(text),
+        Json::Array(entries) if entries.len() > LONGEST_LIST => Value::Skipped,
         Json::Array(entries) => {
             let entries = entries.into_iter().map(|e| of_json(e, depth + 1));
             Value::List(entries.collect())
@@ -212,6 +213,22 @@ mod tests {
         assert_eq!(names, ["/a.on", "/a.parts.0", "/a.parts.1", "/a.x"]);
         assert_eq!(log.remarks.len(), 2, "{:?}", log.remarks);
         assert!(log.remarks[0].contains("1 of 2 messages"));
+    }
+
+    #[test]
+    fn a_long_list_is_no_reading_in_json_either() {
+        let mut topics = Topics::new(&[]);
+        let json = Described {
+            kind: "any",
+            encoding: "json",
+            schema: "jsonschema",
+            text: b"",
+        };
+        let ranges = vec!["1.5"; LONGEST_LIST + 1].join(",");
+        let message = format!(r#"{{"ranges": [{ranges}], "x": 1}}"#);
+        topics.push("/scan", json, 5, message.as_bytes());
+        let log = topics.finish("log").unwrap();
+        assert_eq!(log.series.len(), 1);
     }
 
     #[test]

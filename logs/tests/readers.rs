@@ -40,8 +40,10 @@ fn imported(paths: &[PathBuf]) -> Vec<asid_core::Episode> {
         );
         let mappings = proposal.mappings();
         let [commands, readings] = wanted(&plant.layout, &mappings);
-        let (table, _) = log.table(&commands, &readings);
-        of_table(path, &table, &plant.layout, &mappings).unwrap().0
+        let (table, _) = log.table(&commands, &readings, &[]);
+        of_table(path, &table, &plant.layout, (&mappings, &[]))
+            .unwrap()
+            .0
     };
     paths.iter().map(one).collect()
 }

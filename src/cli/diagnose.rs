@@ -14,6 +14,7 @@ use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
+use asid_mjcf::Plant;
 use asid_report::diagnosis::page;
 use asid_results::diagnosis::{NotTried, RealWorld};
 use asid_results::trace::{DiagnosisTrace, NamedText};
@@ -311,9 +312,11 @@ fn refined(study: &Study, diagnosis: &Diagnosis, folder: &Path) -> Result<String
 
 /// Copies the logs, `train-…` and `test-…`.
 fn copy_logs(study: &Study, folder: &Path) -> Result<()> {
+    let plant = Plant::of(&study.scene)?;
     for (kind, logs) in [("train", &study.train), ("test", &study.test)] {
         for (i, (_, episode)) in logs.iter().enumerate() {
-            episode.write_csv(&folder.join(format!("{kind}-{}.csv", i + 1)))?;
+            let path = folder.join(format!("{kind}-{}.csv", i + 1));
+            episode.write_csv_with_start(&path, &plant.layout)?;
         }
     }
     Ok(())

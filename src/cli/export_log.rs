@@ -185,10 +185,14 @@ mod with_mcap {
 
     /// Numbers names that occur more than once.
     fn tell_apart(logs: &mut [RawLog]) {
-        let names: Vec<String> = logs.iter().map(|l| l.name.clone()).collect();
+        let mut names: Vec<String> = logs.iter().map(|l| l.name.clone()).collect();
+        let own = names.clone();
         for (i, log) in logs.iter_mut().enumerate() {
-            if names.iter().filter(|n| **n == names[i]).count() > 1 {
-                log.name = format!("{}_{}", names[i], i + 1);
+            if own.iter().filter(|n| **n == own[i]).count() > 1 {
+                let numbered = (i + 1..).map(|number| format!("{}_{number}", own[i]));
+                let free = numbered.into_iter().find(|name| !names.contains(name));
+                log.name = free.unwrap_or_default();
+                names.push(log.name.clone());
             }
         }
     }

@@ -10,11 +10,12 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use asid_core::{Episode, Error, Layout};
+use asid_core::{Episode, Error};
 use asid_logs::counted::check_units;
-use asid_logs::episode::{ColumnMapping, of_table, wanted};
+use asid_logs::episode::{ColumnMapping, LogNotes, angles, of_table, read_as, wanted};
 use asid_logs::propose::{Proposal, propose};
-use asid_logs::{LogFormat, Numberless, RawLog};
+use asid_logs::{LogFormat, LogSettings, Numberless, RawLog};
+use asid_mjcf::Plant;
 
 use super::failure;
 use super::machine::{Subject, sensors};
@@ -47,8 +48,8 @@ pub struct Arguments {
     /// Read this topic only (repeatable) [default: all that hold numbers]
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
-    /// Read a sensor or command from this column, such as ctrl.elbow=/arm/target.data.1
-    /// (repeatable)
+    /// Read a sensor or command from this column, such as ctrl.elbow=/arm/target.data.1, or the
+    /// stamps of a table: time=host_clock (repeatable)
     #[arg(long, value_name = "NAME=COLUMN")]
     map: Vec<String>,
     /// Write the episodes as CSV files of the model's own names and units, in place of references
@@ -76,6 +77,8 @@ pub struct Imported {
     pub raw: RawLog,
     /// The log as an episode of the model.
     pub episode: Episode,
+    /// Sensors whose angles jumped by a turn, with the number of jumps that were taken out.
+    pub turns: Vec<(String, usize)>,
 }
 
 /// Runs the import.
@@ -95,7 +98,14 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     let mut notes = Vec::new();
     let bare = subject.plant.layout.sensors.is_empty();
     let subject = sensors::with_sensors(subject, &mut notes)?;
-    let (raw, settings) = open(&arguments.logs, &arguments.test, &arguments.topic)?;
+    let mut given = given(&arguments.map)?;
+    let stamps = given.iter().position(|(name, _)| name == "time");
+    let settings = LogSettings {
+        kind: None,
+        topics: arguments.topic.clone(),
+        stamps: stamps.map(|place| given.remove(place).1),
+    };
+    let (raw, settings) = open(&arguments.logs, &arguments.test, settings)?;
     let kind = settings.kind.unwrap_or(LogFormat::Csv);
     if kind == LogFormat::Csv && !arguments.topic.is_empty() {
         return Err(Error::Config {
@@ -104,7 +114,13 @@ pub fn import(arguments: &Arguments) -> Result<()> {
         }
         .into());
     }
-    let given = given(&arguments.map)?;
+    if !kind.is_table() && settings.stamps.is_some() {
+        return Err(Error::Config {
+            key: "--map time".into(),
+            message: "each message of a recording has its own stamp: it is for tables".into(),
+        }
+        .into());
+    }
     if raw.is_empty() {
         return Err(Error::Failed("no log holds an episode".into()).into());
     }
@@ -123,6 +139,12 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     }
     check_units(&subject.plant, &proposal.mappings())?;
     let mut imported = episodes(raw, &subject, &proposal)?;
+    let turns = imported.iter().flat_map(|one| one.turns.clone()).collect();
+    let counted = LogNotes {
+        turns,
+        ..LogNotes::default()
+    };
+    notes.extend(counted.lines());
     if !arguments.quiet {
         failure::note("trying the mapping in the model");
     }
@@ -230,12 +252,13 @@ fn left(proposal: &Proposal, log: &RawLog) -> String {
 fn episodes(raw: Vec<Opened>, subject: &Subject, proposal: &Proposal) -> Result<Vec<Imported>> {
     let mappings = proposal.mappings();
     let one = |(path, raw, test): Opened| {
-        let episode = episode(&path, &raw, &subject.plant.layout, &mappings)?;
+        let (episode, notes) = episode(&path, &raw, &subject.plant, &mappings)?;
         Ok(Imported {
             path,
             test,
             raw,
             episode,
+            turns: notes.turns,
         })
     };
     raw.into_iter().map(one).collect()
@@ -245,13 +268,17 @@ fn episodes(raw: Vec<Opened>, subject: &Subject, proposal: &Proposal) -> Result<
 fn episode(
     path: &Path,
     raw: &RawLog,
-    layout: &Layout,
+    plant: &Plant,
     mappings: &[ColumnMapping],
-) -> Result<Episode> {
+) -> Result<(Episode, LogNotes)> {
+    let (layout, angles) = (&plant.layout, angles(plant, mappings));
+    let columns = (mappings, &angles[..]);
     if raw.stamps.is_some() {
-        return Ok(asid_logs::episode::read_mapped(path, layout, mappings)?.0);
+        return Ok(read_as(LogFormat::of(path), path, layout, columns)?);
     }
     let [commands, readings] = wanted(layout, mappings);
-    let (table, _) = raw.table(&commands, &readings);
-    Ok(of_table(path, &table, layout, mappings)?.0)
+    let (table, streams) = raw.table(&commands, &readings, &angles);
+    let (episode, mut notes) = of_table(path, &table, layout, columns)?;
+    notes.turns.extend(streams.turns);
+    Ok((episode, notes))
 }

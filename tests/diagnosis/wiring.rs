@@ -41,7 +41,7 @@ fn spoilt(study: &Study, mappings: &[ColumnMapping]) -> Study {
     let layout = &machine(study).plant.layout.clone();
     let mut spoilt = study.clone();
     for (_, episode) in spoilt.train.iter_mut().chain(&mut spoilt.test) {
-        *episode = remapped(episode, layout, mappings).unwrap();
+        *episode = remapped(episode, layout, (mappings, &[])).unwrap();
     }
     spoilt
 }

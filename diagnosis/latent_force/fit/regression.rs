@@ -147,7 +147,11 @@ pub(super) fn compare(
             best = Some(Compared {
                 scale,
                 here,
-                promised: found.gain - own - determinant + 0.5 * prior,
+                promised: if determinant.is_finite() {
+                    found.gain - own - determinant + 0.5 * prior
+                } else {
+                    0.0
+                },
                 found,
             });
         }
@@ -167,10 +171,13 @@ pub(super) fn in_units(
     })
 }
 
-/// Half the log-determinant of the posterior covariance, in units of the prior.
+/// Half the log-determinant of the posterior covariance, in units of the prior; infinitely small
+/// where it has none.
 fn determinant_of(found: &Evidence) -> f64 {
     let factor = found.covariance.clone().cholesky();
-    factor.map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+    factor.map_or(f64::NEG_INFINITY, |c| {
+        c.l_dirty().diagonal().iter().map(|x| x.ln()).sum()
+    })
 }
 
 /// Shifts a linearisation by changes of the values of its columns.

@@ -219,6 +219,7 @@ mod tests {
                     rows: (0..ROWS).collect(),
                     substeps: vec![1; ROWS - 1],
                     ctrl: Vec::new(),
+                    at_steps: Vec::new(),
                     segment: Some(1),
                     time,
                 },

@@ -64,6 +64,7 @@ impl Case {
                 time,
                 substeps: vec![1; rows - 1],
                 ctrl: Vec::new(),
+                at_steps: Vec::new(),
                 segment: None,
             },
             linear: LinearEpisode {
@@ -124,6 +125,7 @@ impl Case {
                 time: (0..rows).map(|k| k as f64 * dt).collect(),
                 substeps: vec![1; rows - 1],
                 ctrl: Vec::new(),
+                at_steps: Vec::new(),
                 segment: None,
             },
             linear: LinearEpisode {

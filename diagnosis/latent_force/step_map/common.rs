@@ -27,6 +27,8 @@ pub(super) struct Common<'a> {
     pub(super) depends_on_past: bool,
     /// Whether an effect makes readings depend on earlier ones.
     pub(super) remembers_readings: bool,
+    /// Whether each entry of a row is of a sensor with such an effect.
+    pub(super) late: Vec<bool>,
     /// Whether an effect changes what sensors read.
     pub(super) alters_readings: bool,
     /// Whether one physics step gives a row's derivatives with respect to the state.
@@ -58,11 +60,18 @@ impl Common<'_> {
     /// Writes what the log reads at row `k` of a walk less a reading of the model; NaN where it
     /// does not count.
     pub(super) fn residual(&self, (walk, k): (&Walk, usize), read: &[f64], out: &mut [f64]) {
-        let readings = &self.logs.episodes[walk.episode].readings;
-        let logged = &readings[walk.rows[k] * read.len()..(walk.rows[k] + 1) * read.len()];
-        self.logs.reading_difference(logged, read, out);
+        self.logs
+            .reading_difference(walk.readings(self.logs, k), read, out);
         if walk.segment.is_some_and(|lead| k < lead) {
             out.fill(f64::NAN);
+        }
+        if k == 0 && walk.rows[0] > 0 {
+            // The command before it, which a force follows, is in another walk.
+            for (x, entry) in out.iter_mut().zip(&self.logs.entries) {
+                if self.logs.sensors[entry.sensor].jumps {
+                    *x = f64::NAN;
+                }
+            }
         }
     }
 

@@ -92,6 +92,7 @@ mod tests {
             time: vec![0.0; substeps.len() + 1],
             substeps: substeps.to_vec(),
             ctrl: Vec::new(),
+            at_steps: Vec::new(),
             segment: Some(0),
         }
     }

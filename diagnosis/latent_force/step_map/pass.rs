@@ -89,7 +89,7 @@ impl Part {
                 if c.rolls(w, want) {
                     continue;
                 }
-                retime(episode, &c.walks[w].time, ramps, (ns, nx, m));
+                retime(episode, &c.walks[w].time, (ramps, &c.late), (nx, m));
             }
         }
         Ok(episodes)

@@ -32,6 +32,7 @@ mod tests {
             time: Vec::new(),
             substeps: Vec::new(),
             ctrl: Vec::new(),
+            at_steps: Vec::new(),
             segment: None,
         };
         let walks: Vec<Walk> = [3, 9, 4, 5, 2].map(walk).into();

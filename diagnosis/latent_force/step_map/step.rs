@@ -68,7 +68,6 @@ impl Part {
             k,
             substeps,
         } = stepped;
-        let replayed = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
         let (read, all): (Vec<usize>, Vec<usize>) =
             (0..roles.len()).partition(|&v| request.is_read_alone(roles[v]));
         let (mut short, mut whole) = (Vec::new(), all.clone());
@@ -86,12 +85,9 @@ impl Part {
         }
         self.advance(c, (stepped, &whole), done..substeps, request, row)?;
         for v in read {
+            // Their command is that of the unperturbed model too: a drive's force depends on it.
             let sims: Vec<usize> = now.iter().map(|e| v * self.walks.len() + e).collect();
-            if replayed {
-                self.simulator.follow(now, &sims)?;
-            } else {
-                self.simulator.pass_time(&sims, substeps as u64);
-            }
+            self.simulator.follow(now, &sims)?;
         }
         let (nv, m) = (c.layout.nv, request.variations.len());
         let (nx, width) = (2 * nv, c.layout.nq + nv);

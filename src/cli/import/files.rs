@@ -7,6 +7,7 @@ use anyhow::Result;
 use asid_core::Error;
 use asid_effects::native::plain;
 use asid_logs::LogSettings;
+use asid_logs::episode::ColumnMapping;
 use asid_logs::propose::Proposal;
 use asid_mjcf::native::way;
 use serde::Serialize;
@@ -95,10 +96,18 @@ impl Files<'_> {
         };
         let toml = |e: toml::ser::Error| Error::Failed(e.to_string());
         let mut text = toml::to_string(&head).map_err(toml)?;
-        if !copied {
+        if copied {
+            // Else the rate would decide, and rows of a slow log would be those of a fast one in ms.
+            let time = ColumnMapping {
+                unit: Some("s".into()),
+                ..ColumnMapping::of("time")
+            };
+            let _ = write!(text, "\n{}\n", time.lines());
+        } else {
             let settings = LogSettings {
                 kind: self.settings.kind,
                 topics: self.proposal.topics.clone(),
+                ..LogSettings::default()
             };
             let log = toml::to_string(&LogPart { log: &settings }).map_err(toml)?;
             let _ = write!(text, "\n{log}");

@@ -9,8 +9,7 @@ use asid_logs::{LogFormat, LogSettings, Opener, RawLog};
 /// Path and log, and whether it is held out.
 pub(super) type Opened = (PathBuf, RawLog, bool);
 
-/// Opens the logs of `fitted` and `held_out`, reading the given `topics`, and returns their kind
-/// too.
+/// Opens the logs of `fitted` and `held_out` under some settings, and returns these with their kind.
 ///
 /// Each log comes with its path and whether it is held out. Without `held_out` the last third is
 /// held out.
@@ -20,12 +19,8 @@ pub(super) type Opened = (PathBuf, RawLog, bool);
 pub(super) fn open(
     fitted: &[PathBuf],
     held_out: &[PathBuf],
-    topics: &[String],
+    mut settings: LogSettings,
 ) -> Result<(Vec<Opened>, LogSettings)> {
-    let mut settings = LogSettings {
-        kind: None,
-        topics: topics.to_vec(),
-    };
     let mut opener = Opener::default();
     let mut all: Vec<Opened> = Vec::new();
     let each = fitted.iter().map(|p| (p, false));

@@ -118,7 +118,7 @@ pub(super) fn look(
     if !mended.wiring.is_empty() {
         let mappings = proposal.mappings();
         for one in imported {
-            one.episode = episode(&one.path, &one.raw, &subject.plant.layout, &mappings)?;
+            (one.episode, _) = episode(&one.path, &one.raw, &subject.plant, &mappings)?;
         }
     }
     Ok(said)

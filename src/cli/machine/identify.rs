@@ -199,7 +199,8 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         )?;
         for (kind, logs) in [("train", &study.train), ("test", &study.test)] {
             for (i, (_, episode)) in logs.iter().enumerate() {
-                episode.write_csv(&folder.join(format!("{kind}-{}.csv", i + 1)))?;
+                let path = folder.join(format!("{kind}-{}.csv", i + 1));
+                episode.write_csv_with_start(&path, &subject.plant.layout)?;
             }
         }
         report.write(folder)?;
