@@ -170,7 +170,7 @@ fn worlds<'f, F>(found: impl Iterator<Item = (&'f [String], F)>) -> Vec<(Answer,
 }
 
 /// Returns the probability that the answer to the real logs is right, by Bayes' rule over the
-/// simulated worlds; `None` if none gave it.
+/// simulated worlds; `None` if none gave it, and for `unknown`.
 ///
 /// The weight of a world is its probability times how often it gave that answer.
 fn probability(
@@ -180,6 +180,10 @@ fn probability(
     alike: &[f64],
     rows: &[CalibrationRow],
 ) -> Option<f64> {
+    // No simulated world has a cause that the catalogue lacks.
+    if said.0 == Kind::Unknown {
+        return None;
+    }
     let prior = |effects: &[String]| -> f64 {
         let all = work.judgement.hypotheses.iter();
         all.filter(|h| h.labels == effects)

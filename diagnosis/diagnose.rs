@@ -69,8 +69,14 @@ pub fn diagnose(
         && !progress.is_stopped()
     {
         progress.note("the wiring was estimated short");
-        intake.mend_further(&short, &machine.plant.layout)?;
-        (diagnosis, work) = physics(&intake.study)?;
+        let mut further = intake.clone();
+        further.mend_further(&short, &machine.plant.layout)?;
+        let other = physics(&further.study)?;
+        // One that was cut short replaces no complete one, unless it predicts better.
+        if !progress.is_stopped() || other.0.result.gap.refined < diagnosis.result.gap.refined {
+            (diagnosis, work) = other;
+            intake = further;
+        }
     }
     let (bench, point) = (&work.bench, &work.findings.none.fit.point);
     let residuals = plain_residuals(bench, &bench.train, &[], point)?;

@@ -33,6 +33,7 @@ const CLOCK: &str = "wiring-clock";
 const ZERO: &str = "wiring-offset";
 
 /// A study whose logs are ready for a diagnosis.
+#[derive(Clone)]
 pub struct Intake {
     /// The study without outliers in its logs, with the wiring that is in use.
     pub study: Study,

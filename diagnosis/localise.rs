@@ -32,6 +32,7 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
     let mut cells: Vec<(usize, String, f64)> = Vec::new();
     for e in 0..logs.episodes.len() {
         let path = &shown.episodes[e];
+        let fastest = fastest(path, plant.layout.nv);
         let rows = logs.episodes[e].plan.rows();
         for (j, entry) in logs.entries.iter().enumerate() {
             let name = &logs.sensors[entry.sensor].name;
@@ -40,7 +41,7 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
                 if !r.is_finite() || r == 0.0 {
                     continue;
                 }
-                let regime = regime(plant, shown, path, name, k, rows);
+                let regime = regime(plant, shown, (path, &fastest), name, k, rows);
                 let excess = r * r - 1.0;
                 match cells.iter_mut().find(|(i, g, _)| *i == j && *g == regime) {
                     Some(cell) => cell.2 += excess,
@@ -72,7 +73,7 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
 fn regime(
     plant: &Plant,
     shown: &Trajectory,
-    path: &Path,
+    (path, fastest): (&Path, &[f64]),
     sensor: &str,
     row: usize,
     rows: usize,
@@ -86,19 +87,35 @@ fn regime(
         Some(Reads::Joint(j))
             if matches!(layout.joints[j].kind, JointKind::Hinge | JointKind::Slide) =>
         {
-            joint_regime(plant, path, j, row)
+            joint_regime(plant, (path, fastest), j, row)
         }
         Some(Reads::Body(b)) => body_regime(plant, shown, path, b, row),
         _ => "motion".into(),
     }
 }
 
-fn joint_regime(plant: &Plant, path: &Path, joint: usize, row: usize) -> String {
+/// Returns the largest speed of each degree of freedom along a path, `nv`.
+fn fastest(path: &Path, nv: usize) -> Vec<f64> {
+    let mut fastest = vec![0.0_f64; nv];
+    for speeds in path.qvel.chunks_exact(nv.max(1)) {
+        for (fastest, v) in fastest.iter_mut().zip(speeds) {
+            *fastest = fastest.max(v.abs());
+        }
+    }
+    fastest
+}
+
+fn joint_regime(
+    plant: &Plant,
+    (path, fastest): (&Path, &[f64]),
+    joint: usize,
+    row: usize,
+) -> String {
     let layout = &plant.layout;
     let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
     let place = &layout.joints[joint];
     let speeds = || path.qvel.iter().skip(place.qvel).step_by(nv);
-    let largest = speeds().fold(0.0, |a: f64, v| a.max(v.abs()));
+    let largest = fastest[place.qvel];
     let speed = path.qvel[row * nv + place.qvel];
     let saturated = plant.drives_of(joint).any(|(i, d)| {
         let u = path.ctrl[row * nu + i];

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use asid_core::layout::Keyframe;
 use asid_core::{Backend, Model, Result, Scene, Target};
 use asid_effects::EffectSpec;
-use asid_effects::refined::Refined;
+use asid_effects::refined::{Refined, as_compiled};
 use asid_mjcf::Plant;
 
 use crate::home::default_state;
@@ -46,7 +46,7 @@ impl Machine {
         threads: usize,
     ) -> Result<Self> {
         let model = backend.load(scene)?;
-        let mut plant = Plant::of(scene)?;
+        let mut plant = as_compiled(&Plant::of(scene)?, &*model, scene.name())?;
         if plant.layout.keyframes.is_empty() {
             plant.layout.keyframes.push(default_state(&*model)?);
         }

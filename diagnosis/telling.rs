@@ -273,12 +273,11 @@ impl Telling<'_> {
     /// Proposes an experiment that distinguishes the verdict from its nearest rival.
     fn next(&self, best: Option<&Found>) -> Result<Proposed> {
         let j = self.judgement;
-        let rival = j.ambiguous.first().copied().or_else(|| {
+        let is_replayed = |i: &usize| j.hypotheses[*i].found.is_some();
+        let rival = j.ambiguous.iter().copied().find(is_replayed).or_else(|| {
             let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
             let none = |i: &usize| j.hypotheses[*i].labels.is_empty();
-            rivals()
-                .find(|&i| j.hypotheses[i].found.is_some())
-                .or_else(|| rivals().find(none))
+            rivals().find(is_replayed).or_else(|| rivals().find(none))
         });
         let Some(rival) = rival else {
             return Ok(Proposed::default());

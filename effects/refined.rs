@@ -5,6 +5,7 @@
 //! of a batch has effects of its own, whose parameters are columns like the scene's:
 //! `effect/NAME@SITE/PARAMETER`. A row whose effect has null values runs without it, at no cost.
 
+mod compiled;
 mod ranges;
 mod rows;
 mod simulator;
@@ -19,6 +20,7 @@ use asid_core::scene::Scene;
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::target::Target;
 use asid_mjcf::plant::Plant;
+pub use compiled::as_compiled;
 use ranges::{Ranged, behind_ranges, ranged};
 use rows::Effects;
 use simulator::Column;
@@ -81,7 +83,7 @@ pub struct Refined {
 impl Refined {
     /// Gives `model` some parameter values and effects.
     ///
-    /// `backend` must have compiled `model` from the scene of `plant`.
+    /// `backend` must have compiled `model` from the scene of `plant`, which is [`as_compiled`].
     ///
     /// # Errors
     /// When an effect, site, parameter or target is unknown, or is not for this engine.
@@ -154,8 +156,9 @@ impl Refined {
     /// # Errors
     /// As [`Backend::load`] and [`Refined::new`].
     pub fn load(backend: &dyn Backend, scene: &Scene, effects: &[EffectSpec]) -> Result<Arc<Self>> {
-        let plant = Arc::new(Plant::of(scene)?);
-        Self::new(backend, backend.load(scene)?, plant, &[], effects)
+        let model = backend.load(scene)?;
+        let plant = as_compiled(&Plant::of(scene)?, &*model, scene.name())?;
+        Self::new(backend, model, Arc::new(plant), &[], effects)
     }
 
     /// Whether a target is the number of the episode.

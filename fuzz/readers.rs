@@ -359,7 +359,7 @@ fn message(path: &Path) -> Result<(), String> {
     }
     let log = topics.finish("log")?;
     let names: Vec<String> = log.series.iter().map(|s| s.name.clone()).collect();
-    let _ = log.table(&names, &names);
+    let _ = log.table(&names, &names, &[]);
     match log.remarks.first() {
         Some(remark) => Err(remark.clone()),
         None => Ok(()),

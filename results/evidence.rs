@@ -44,6 +44,20 @@ pub struct Tried {
     pub replayed: Replayed,
 }
 
+/// A set of effects that was fitted and not replayed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fitted {
+    /// Effects at their sites, sorted.
+    pub effects: Vec<String>,
+    /// How many named things it is.
+    pub names: usize,
+    /// Evidence over the model without effects, with the prior odds of its names, natural logarithm.
+    #[serde(deserialize_with = "nullable::scalar")]
+    pub evidence: f64,
+    /// Logarithm of these prior odds, natural, without the price of names.
+    pub prior: f64,
+}
+
 /// A set of effects that was screened and not fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Screened {
@@ -81,6 +95,9 @@ pub struct Evidence {
     pub found: Option<usize>,
     /// Place in `tried` of what the logs show without a search, such as encoder steps; `None` for no effect.
     pub known: Option<usize>,
+    /// Sets that were fitted and not replayed, the most evident first.
+    #[serde(default)]
+    pub fitted: Vec<Fitted>,
     /// Sets that were screened and not fitted, the most evident first.
     pub screened: Vec<Screened>,
     /// Mean square of the engine's own error over the logs that were fitted to, in units of the noise; NaN where it was not asked, as in a search that was cut short.

@@ -93,6 +93,24 @@ fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
         .map_or_else(|| DMatrix::identity(n, n), |c| c.inverse())
 }
 
+/// The 97.5 % quantile of Student's distribution with some degrees of freedom.
+///
+/// From the eleventh on by the first terms of its expansion about the normal one (Cornish and
+/// Fisher), right to a thousandth.
+fn student_975(degrees: usize) -> f64 {
+    const FEW: [f64; 10] = [
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
+    ];
+    let z = 1.959_964_f64;
+    let n = degrees as f64;
+    let more = (z.powi(3) + z) / (4.0 * n)
+        + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n);
+    match degrees.checked_sub(1) {
+        Some(place) if place < FEW.len() => FEW[place],
+        _ => z + more,
+    }
+}
+
 /// Information whose standard deviations are at least the disagreement of the episodes.
 ///
 /// Correlations stay; standard deviations grow.
@@ -108,7 +126,9 @@ pub(crate) fn widened(information: &DMatrix<f64>, parts: &[Part]) -> DMatrix<f64
     let factor = |k: usize| {
         let mean = pulls.iter().map(|p| p[k]).sum::<f64>() / count;
         let squares: f64 = pulls.iter().map(|p| (p[k] - mean).powi(2)).sum();
-        let disagree = count * squares / (count - 1.0);
+        // The variance of a few episodes is known badly: Student's quantile in place of the normal one.
+        let wider = student_975(parts.len() - 1) / student_975(usize::MAX);
+        let disagree = wider * wider * count * squares / (count - 1.0);
         (covariance[(k, k)] / disagree.max(covariance[(k, k)])).sqrt()
     };
     let factors = DMatrix::from_diagonal(&DVector::from_fn(n, |k, _| factor(k)));
@@ -134,8 +154,8 @@ mod tests {
         let off = [0.9, -1.1, 0.4, -0.2];
         let (information, parts) = read(&off);
         let wide = widened(&information, &parts);
-        // The standard error of a mean of four; the prior has no weight.
-        let variance = off.iter().map(|x| x * x).sum::<f64>() / 3.0 / 4.0;
+        // The standard error of a mean of four, by Student's quantile; the prior has no weight.
+        let variance = (3.182_f64 / 1.96).powi(2) * off.iter().map(|x| x * x).sum::<f64>() / 12.0;
         assert!((wide[(0, 0)] * variance - 1.0).abs() < 0.05, "{wide}");
     }
 

@@ -27,8 +27,11 @@ const SHRINKS: usize = 43;
 /// Factor by which the answer is enlarged to see which limit it would break first.
 const LARGER: f64 = 1.25;
 
-/// Most corners of the ranges that the answer is checked at.
+/// Most corners of the ranges that a search checks a motion at.
 const CORNERS: usize = 16;
+
+/// Most corners that the answer is checked at: those of eight entries, in one batch.
+const ALL_CORNERS: usize = 256;
 
 /// A designed motion.
 #[derive(Clone, Debug)]
@@ -97,7 +100,7 @@ impl<'a> Designer<'_, 'a> {
             });
         }
         let mut rng = streams.stream("design");
-        let corners = self.corners(&mut streams.stream("corners"));
+        let corners = self.corners(CORNERS, &mut streams.stream("corners"));
         let ends = ends(self.parameters, &self.values);
         let points = [vec![self.values.clone()], ends, corners].concat();
         let (coefficients, course) = match method {
@@ -105,7 +108,18 @@ impl<'a> Designer<'_, 'a> {
             Method::Multisine => (self.family.multisine(), Vec::new()),
             Method::Random | Method::Fourier => (self.family.random(&mut rng), Vec::new()),
         };
-        self.finish(&coefficients, course, &points)
+        let all = self.corners(ALL_CORNERS, &mut streams.stream("all corners"));
+        self.finish(&coefficients, course, &[points, all].concat())
+    }
+
+    /// The points of the ranges that a motion is checked at, in words.
+    #[must_use]
+    pub fn checked_at(entries: usize) -> String {
+        if is_few(entries, ALL_CORNERS) {
+            "at the ends and corners of the unknowns' ranges too".into()
+        } else {
+            format!("at the ends and {ALL_CORNERS} random corners of the unknowns' ranges too")
+        }
     }
 
     /// The ranking of candidates, with points `far` from the middle.
@@ -134,11 +148,11 @@ impl<'a> Designer<'_, 'a> {
         words.join(", ")
     }
 
-    /// Corners of the ranges: all of them where they are few, else random ones.
-    fn corners(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
+    /// Corners of the ranges: all of them if they are no more than `most`, else so many random ones.
+    fn corners(&self, most: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = self.parameters.len();
-        let few = n < usize::BITS as usize && 1 << n <= CORNERS;
-        let count = if few { 1 << n } else { CORNERS };
+        let few = is_few(n, most);
+        let count = if few { 1 << n } else { most };
         (0..count)
             .map(|k| {
                 let upper =
@@ -210,6 +224,11 @@ impl<'a> Designer<'_, 'a> {
             course,
         })
     }
+}
+
+/// Whether the ranges of `n` entries have no more than `most` corners.
+fn is_few(n: usize, most: usize) -> bool {
+    n < usize::BITS as usize && 1 << n <= most
 }
 
 /// Violations of several plays combined.

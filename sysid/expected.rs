@@ -65,8 +65,9 @@ impl Expected {
             .collect();
         let (again, _) = play(differences_over(parameters, values, &steps))?;
         let both = slopes.zip(again).map(|(a, b)| agreed(&a, &b));
+        let told = Told::of(both.as_deref(), (sought, parameters.len()));
         Ok(Self {
-            told: Told::of(both.as_deref(), (sought, parameters.len())),
+            told: told.no_more_than(&by_slopes),
             by_slopes,
             played,
         })

@@ -16,6 +16,7 @@ use asid_core::{Model, Parameter, Posterior, Progress, Streams};
 use nalgebra::DMatrix;
 
 use crate::by_episodes::{parts, widened};
+use crate::check_scales;
 use crate::dataset::{Dataset, Replayer};
 use crate::marginal::{marginal, values};
 use crate::valleys::{Watched, confirmed};
@@ -82,6 +83,7 @@ pub fn fit(
                 .into(),
         });
     }
+    check_scales(parameters)?;
     let layout = model.layout();
     let open = data.trials.iter().map(|t| t.open.len()).max().unwrap_or(0);
     let size = settings

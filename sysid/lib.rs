@@ -32,7 +32,25 @@ pub mod start;
 pub mod tells;
 mod valleys;
 
+use asid_core::error::{Error, Result};
 use asid_core::{Parameter, Target};
+
+/// Refuses parameters of two values: fits and derivatives are over ranges.
+///
+/// # Errors
+/// When there is one; the message names it.
+pub fn check_scales(parameters: &[Parameter]) -> Result<()> {
+    match parameters.iter().find(|p| p.is_binary()) {
+        None => Ok(()),
+        Some(p) => Err(Error::Config {
+            key: format!("parameter {}", p.name),
+            message:
+                "has two values, and only a range can be fitted or explored: give it a linear or \
+                      log scale, or one of the values in the model"
+                    .into(),
+        }),
+    }
+}
 
 /// Targets of all parameters, in the order of a batch's columns.
 #[must_use]

@@ -51,12 +51,15 @@ impl Player<'_> {
         drives
     }
 
-    /// Checks one trajectory against the limits.
+    /// Checks one trajectory against the limits: a row before the motion, and one after each frame.
+    ///
+    /// A drive's force is largest as its command begins, at the state before the frame. Within a
+    /// frame of several physics steps the last one begins near the state after it.
     pub(crate) fn look(
         &self,
-        rows: &[f64],
+        (first, rows): (&[f64], &[f64]),
         (commands, drives): (&[f64], &[Option<Drive>]),
-        frames: usize,
+        (frames, substeps): (usize, usize),
     ) -> Played {
         let layout = &self.plant.layout;
         let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
@@ -72,13 +75,21 @@ impl Player<'_> {
             played.excess = excess;
             return played;
         }
+        let state = |row: &'_ [f64]| -> (Vec<f64>, Vec<f64>) {
+            let (q, v) = row[self.readings..self.readings + nq + nv].split_at(nq);
+            (q.to_vec(), v.to_vec())
+        };
+        let mut before = state(first);
         for (k, row) in rows.chunks_exact(width).enumerate() {
-            let q = &row[self.readings..self.readings + nq];
-            let v = &row[self.readings + nq..self.readings + nq + nv];
+            let (q, v) = &state(row);
             let contact = &row[self.readings + nq + nv..];
             self.look_at_joints(q, v, frames, &mut excess);
             let command = &commands[k * nu..(k + 1) * nu];
-            self.look_at_drives(drives, command, (q, v, frames), &mut excess);
+            let at_begin = (&before.0[..], &before.1[..], frames);
+            self.look_at_drives(drives, command, at_begin, &mut excess);
+            if substeps > 1 {
+                self.look_at_drives(drives, command, (q, v, frames), &mut excess);
+            }
             let pairs = self.limits.apart.iter().zip(&self.touching);
             for ((pair, touching), force) in pairs.zip(contact) {
                 if !touching && force.abs() > TOUCH {
@@ -91,6 +102,7 @@ impl Player<'_> {
             self.look_at_boxes(q, frames, &mut excess);
             played.readings.extend_from_slice(&row[..self.readings]);
             played.qpos.extend_from_slice(q);
+            before = (q.clone(), v.clone());
         }
         if let (Some(rest), Some(last)) = (self.limits.rest, rows.chunks_exact(width).last()) {
             let v = &last[self.readings + nq..self.readings + nq + nv];

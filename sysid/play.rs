@@ -246,6 +246,9 @@ impl<'a> Player<'a> {
             let control: Vec<f64> = chunk.iter().flat_map(|(c, _)| c.iter().copied()).collect();
             let frames = chunk.first().map_or(0, |(c, _)| c.len()) / nu.max(1);
             let width = self.record.width();
+            // A frame's command begins to act at the state before the frame.
+            let mut first = vec![0.0; chunk.len() * width];
+            self.simulator.read(&sims, &self.record, &mut first)?;
             let mut out = vec![0.0; chunk.len() * frames * width];
             let rollout = Rollout::new(
                 &sims,
@@ -255,8 +258,10 @@ impl<'a> Player<'a> {
                 &self.record,
             );
             self.simulator.rollout(&rollout, &mut out)?;
-            for (rows, (commands, point)) in out.chunks_exact((frames * width).max(1)).zip(chunk) {
-                all.push(self.look(rows, (commands, &self.drives_at(point)), frames));
+            let each = out.chunks_exact((frames * width).max(1));
+            for ((rows, first), (commands, point)) in each.zip(first.chunks(width)).zip(chunk) {
+                let drives = self.drives_at(point);
+                all.push(self.look((first, rows), (commands, &drives), (frames, substeps)));
             }
         }
         Ok(all)

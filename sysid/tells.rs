@@ -87,6 +87,26 @@ impl Told {
         }
     }
 
+    /// This information, reduced where the `other` tells less of an entry.
+    ///
+    /// A derivative that is left out of one entry alone may also part it from those that it was
+    /// confounded with.
+    #[must_use]
+    pub(crate) fn no_more_than(&self, other: &Self) -> Self {
+        let pairs = self
+            .all_deviations()
+            .into_iter()
+            .zip(other.all_deviations());
+        let factors: Vec<f64> = pairs
+            .map(|(own, other)| if other > own { own / other } else { 1.0 })
+            .collect();
+        let n = factors.len();
+        Self {
+            matrix: DMatrix::from_fn(n, n, |i, j| factors[i] * self.matrix[(i, j)] * factors[j]),
+            sought: self.sought,
+        }
+    }
+
     /// `times` times this information, plus another one.
     #[must_use]
     pub fn and(&self, times: f64, other: &Self) -> Self {

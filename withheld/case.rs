@@ -152,8 +152,8 @@ impl Draw<'_> {
             gap: self.gap_of(&bench, &dirt)?,
             items: dirt,
         };
-        let (causes, target) = self.sized_causes(&bench, &mut dirt, left_out)?;
-        let (dirt, dirt_gap) = (dirt.items, dirt.gap);
+        let (mut causes, target) = self.sized_causes(&bench, &mut dirt, left_out)?;
+        let (dirt, mut dirt_gap) = (dirt.items, dirt.gap);
         // If the case is to have little motion or many or fast rows, its logs have motions of their
         // own.
         let style = self.style();
@@ -169,7 +169,12 @@ impl Draw<'_> {
             Bench::new(anatomy, &truth, &own, timestep, integrator)?
         };
         if !usual {
+            // What the label says is measured on the motions of the logs.
             integration_gap = self.integration_gap(&bench)?;
+            dirt_gap = self.gap_of(&bench, &dirt)?;
+            for (name, items) in causes.by_name() {
+                causes.own.insert(name, self.gap_of(&bench, &items)?);
+            }
         }
         let mut world = self.world(&bench, &truth, &dirt, &causes, timestep)?;
         let mut watch = Watch::new(anatomy, bench.motions);

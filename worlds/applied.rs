@@ -8,7 +8,7 @@ use asid_core::registry::find;
 use asid_core::signal::Signal;
 use asid_core::{Backend, Capabilities, Model, Parameter, Result, Scene, Target};
 use asid_effects::catalogue::{command_dynamics, mass};
-use asid_effects::refined::{Refined, needs};
+use asid_effects::refined::{Refined, as_compiled, needs};
 use asid_effects::{EffectEntry, EffectSpec};
 use asid_mjcf::Plant;
 
@@ -47,8 +47,8 @@ pub fn perturb(
     let step = Plant::of(scene)?.layout.timestep / drawn.steps.max(1) as f64;
     let scene = scene.with_timestep(step)?;
     // The plant of the scene with the finer step, since a lag counts its steps.
-    let plant = Arc::new(Plant::of(&scene)?);
     let model = backend.load(&scene)?;
+    let plant = Arc::new(as_compiled(&Plant::of(&scene)?, &*model, scene.name())?);
     let mut left_out = Vec::new();
     let mut all_values = values.to_vec();
     let soft = softness(backend, &*model, &plant, (values, unknowns), drawn);

@@ -134,7 +134,9 @@ pub fn sensor_len(kind: &str) -> usize {
         "framepos" | "framelinvel" | "frameangvel" | "framelinacc" | "frameangacc" | "force"
         | "torque" | "accelerometer" | "gyro" | "velocimeter" | "magnetometer" | "framexaxis"
         | "frameyaxis" | "framezaxis" | "subtreecom" | "subtreelinvel" | "subtreeangmom"
-        | "ballangvel" => 3,
+        | "ballangvel" | "normal" => 3,
+        "camprojection" => 2,
+        "fromto" => 6,
         "framequat" | "ballquat" => 4,
         _ => 1,
     }
@@ -154,7 +156,7 @@ pub struct Keyframe {
 }
 
 /// Names and indices of one scene. Every engine gives the same layout for the same scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Layout {
     /// Physics time step, s.
     pub timestep: f64,

@@ -219,10 +219,34 @@ impl Scene {
             scene: self.name.clone(),
             message: "the document is empty".into(),
         })?;
+        // From the back, so that the places before stay.
+        let mut edits = vec![(close..close, format!("<option timestep=\"{value}\"/>\n"))];
+        let before = self.description()?.option.timestep;
+        edits.extend(longer_buffers(&document, before / timestep));
+        edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
         let mut xml = self.xml.clone();
-        xml.insert_str(close, &format!("<option timestep=\"{value}\"/>\n"));
+        edits
+            .into_iter()
+            .for_each(|(range, with)| xml.replace_range(range, &with));
         Ok(self.with_xml(xml))
     }
+}
+
+/// Buffers of delays (`nsample`, in steps) that hold as long where there are `more` steps to a second,
+/// with their places in the text.
+///
+/// Two more hold the ends of the interval in which a delay lies.
+fn longer_buffers(
+    document: &roxmltree::Document<'_>,
+    more: f64,
+) -> Vec<(std::ops::Range<usize>, String)> {
+    let buffers = document.descendants().filter_map(|node| {
+        let buffer = node.attribute_node("nsample")?;
+        let samples: f64 = buffer.value().trim().parse().ok()?;
+        let longer = (samples * more).ceil() + 2.0;
+        (samples > 0.0 && more > 1.0).then(|| (buffer.range_value(), format!("{longer}")))
+    });
+    buffers.collect()
 }
 
 fn read(path: &Path) -> Result<String, Fault> {
@@ -264,6 +288,36 @@ mod tests {
             scene.xml(),
             r#"<mujoco><option timestep="0.01"/><worldbody/></mujoco>"#
         );
+    }
+
+    /// Symptom: a drive's own delay of 20 ms was one of 12 ms at half the time step.
+    ///
+    /// Cause: its buffer holds as many steps as before, which take half the time.
+    #[test]
+    fn delays_stay_where_the_time_step_is_another() {
+        let drive = r#"<motor name="m" joint="j" delay="0.02" nsample="12"/>"#;
+        let xml = format!(
+            r#"<mujoco><option timestep="0.002"/><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody><actuator>{drive}</actuator></mujoco>"#
+        );
+        let scene = Scene::from_xml("delayed", &xml, &[]).unwrap();
+        let samples = |timestep: f64| {
+            let other = scene.with_timestep(timestep).unwrap();
+            let (_, rest) = other.xml().split_once("nsample=\"").unwrap();
+            rest.split_once('"').unwrap().0.parse::<f64>().unwrap()
+        };
+        assert!(samples(0.001) >= 24.0 && samples(0.0005) >= 48.0);
+        assert_eq!(samples(0.002), 12.0);
+        assert_eq!(samples(0.004), 12.0);
+    }
+
+    /// Symptom: a document that MuJoCo reads was refused, without a line.
+    #[test]
+    fn bit_masks_below_zero_and_bodies_that_sleep_are_read() {
+        let xml = r#"<mujoco><worldbody><body name="a" sleep="never"><joint/><geom size="0.1" contype="-1" conaffinity="3"/></body></worldbody></mujoco>"#;
+        let scene = Scene::from_xml("masks", xml, &[]).unwrap();
+        let all = scene.description().unwrap();
+        let geom = &all.bodies[1].body.geoms[0];
+        assert_eq!((geom.contype, geom.conaffinity), (u32::MAX, 3));
     }
 
     #[test]

@@ -20,6 +20,8 @@ pub(super) struct Sets<'e> {
     /// Score of each set: its evidence at the [temperature](Rules::temperature), less the price of
     /// its names.
     scores: Vec<f64>,
+    /// Logarithm of the prior odds of each set, without the price of its names.
+    priors: Vec<f64>,
     /// Index in `all` of each set that was tried.
     places: Vec<usize>,
     /// Index of the tried set that the search found, if it has tolerances and names nothing but
@@ -39,7 +41,7 @@ impl<'e> Sets<'e> {
             is_ordinary(evidence, i) && has_skill(evidence, replayed, rules)
         });
         let mut all = vec![Hypothesis::default()];
-        let mut scores = vec![0.0];
+        let (mut scores, mut priors) = (vec![0.0], vec![0.0]);
         let mut places = vec![0; evidence.tried.len()];
         let named = evidence.tried.iter().enumerate();
         let named = named.filter(|(i, set)| !set.effects.is_empty() && !is_ordinary(evidence, *i));
@@ -51,6 +53,15 @@ impl<'e> Sets<'e> {
                 ..Hypothesis::default()
             });
             scores.push(score(set.evidence, set.names));
+            priors.push(set.prior);
+        }
+        for set in &evidence.fitted {
+            all.push(Hypothesis {
+                labels: set.effects.clone(),
+                ..Hypothesis::default()
+            });
+            scores.push(score(set.evidence, set.names));
+            priors.push(set.prior);
         }
         // With tolerances or without them, what the logs show without a search is one answer.
         let least = evidence.known.map_or(0, |i| places[i]);
@@ -60,12 +71,14 @@ impl<'e> Sets<'e> {
         if let Some(i) = ordinary {
             all[least].found = ordinary;
             scores[least] = score(evidence.tried[i].evidence, evidence.tried[i].names);
+            priors[least] = evidence.tried[i].prior;
         }
         Self {
             evidence,
             rules,
             all,
             scores,
+            priors,
             places,
             ordinary,
             price,
@@ -140,11 +153,7 @@ impl<'e> Sets<'e> {
     pub(super) fn ambiguous(&self, best: usize) -> Vec<usize> {
         let rules = self.rules;
         let named = &self.all[best].labels;
-        let prior = |i: usize| {
-            let found = self.all[i].found;
-            found.map_or(0.0, |tried| self.evidence.tried[tried].prior)
-        };
-        let score = |i: usize| self.scores[i] - prior(i) / rules.temperature;
+        let score = |i: usize| self.scores[i] - self.priors[i] / rules.temperature;
         let as_likely = |i: usize| rules.temperature * (score(best) - score(i)) < rules.apart;
         let rival = |i: usize| {
             let labels = &self.all[i].labels;

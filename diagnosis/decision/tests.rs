@@ -1,5 +1,7 @@
 //! What is decided for evidence written by hand.
 
+use asid_results::evidence::Fitted;
+
 use super::*;
 
 fn replayed(train: f64, held_out: f64) -> Replayed {
@@ -27,6 +29,7 @@ fn evidence(none: f64, tried: Vec<Tried>, left: f64) -> Evidence {
         found: (!tried.is_empty()).then_some(0),
         tried,
         known: None,
+        fitted: Vec::new(),
         screened: Vec::new(),
         own_error: 0.0,
         is_missing: true,
@@ -70,6 +73,30 @@ fn one_law_at_two_sites_is_as_probable_however_it_was_found() {
         p(1),
         p(2)
     );
+}
+
+/// Symptom: a verdict was unambiguous where time was out before its rivals were replayed, and not so
+/// where it was not, with the same evidence.
+///
+/// Cause: a set that was fitted and not replayed was no hypothesis, and none that was screened only.
+#[test]
+fn a_rival_that_was_fitted_counts_whether_or_not_it_was_replayed() {
+    let found = tried(&["a"], 1, 300.0, 1.0);
+    let rival = tried(&["b"], 1, 298.0, 1.1);
+    let replayed = evidence(100.0, vec![found.clone(), rival.clone()], 0.01);
+    let fitted = Evidence {
+        fitted: vec![Fitted {
+            effects: rival.effects,
+            names: rival.names,
+            evidence: rival.evidence,
+            prior: rival.prior,
+        }],
+        ..evidence(100.0, vec![found], 0.01)
+    };
+    let [one, other] = [replayed, fitted].map(|e| decided(&e));
+    let p = |of: &Judgement| of.best_explanation().probability;
+    assert_eq!(p(&one), p(&other));
+    assert_eq!((one.ambiguous.len(), other.ambiguous.len()), (1, 1));
 }
 
 #[test]

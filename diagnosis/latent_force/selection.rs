@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use asid_core::{Progress, Result};
 use asid_mjcf::Plant;
-use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
+use asid_results::evidence::{Evidence, Fitted, Replayed, Screened, Tried};
 
 use crate::bench::held_out::{Explained, misfits};
 use crate::bench::{Bench, Explanation};
@@ -89,6 +89,35 @@ fn screened(
     all
 }
 
+/// Sets that were fitted in any round and not replayed, apart from those that name nothing.
+///
+/// Without a replay they are no verdict, and they take their share of the probability.
+fn fitted(
+    plant: &Plant,
+    outcome: &Outcome,
+    candidates: &[Candidate],
+    tried: &[Tried],
+) -> Vec<Fitted> {
+    let confirmed = outcome.rounds.iter().flat_map(|r| &r.confirmed);
+    let of = |set: &Set| {
+        let prior = log_prior(plant, candidates, &set.candidates);
+        Fitted {
+            effects: labels(candidates, &set.candidates),
+            names: set.names.count(),
+            evidence: set.fitted.evidence - outcome.none.evidence + prior,
+            prior,
+        }
+    };
+    let mut all: Vec<Fitted> = confirmed.map(of).collect();
+    all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    let mut seen: BTreeSet<Vec<String>> = tried.iter().map(|t| t.effects.clone()).collect();
+    seen.insert(Vec::new());
+    // Of sets with the same effects the most evident one is kept.
+    all.retain(|f| f.evidence.is_finite() && seen.insert(f.effects.clone()));
+    all.truncate(SCREENED);
+    all
+}
+
 /// Collects what the decision is based on.
 ///
 /// `sets` are those behind the findings, in their order. `known` are the candidates that the logs
@@ -162,6 +191,7 @@ pub fn gather(
             held_out: about_the_mean(&bench.test.logs),
         },
         repeatable: !findings.repeats.is_some_and(|r| r.scatters),
+        fitted: fitted(plant, outcome, candidates, &tried),
         screened: screened(plant, outcome, (candidates, known), &tried),
         tried,
         found,

@@ -82,7 +82,7 @@ impl Acting for ReadingAt {
 pub(super) fn sensors(plant: &Plant) -> Vec<String> {
     let sensors = plant.layout.sensors.iter();
     sensors
-        .filter(|s| matches!(s.len, 1 | 3) && !s.kind.ends_with("axis"))
+        .filter(|s| matches!(s.len, 1 | 3) && !s.kind.ends_with("axis") && s.kind != "normal")
         .map(|s| s.name.clone())
         .collect()
 }

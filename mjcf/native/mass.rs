@@ -39,6 +39,22 @@ impl Writer<'_, '_> {
             if mass.is_none() && center.is_none() && moments.is_none() {
                 continue;
             }
+            let stated = |option: &str| self.elements.compiler(option).map(str::trim);
+            if stated("inertiafromgeom") == Some("true") {
+                self.leave_out(format!(
+                    "the compiler takes the mass of body `{name}` from its geoms (inertiafromgeom=\"true\"): its new mass \
+                     properties are not written"
+                ));
+                continue;
+            }
+            let total = stated("settotalmass").and_then(|x| x.parse::<f64>().ok());
+            if let Some(total) = total.filter(|x| *x > 0.0) {
+                self.leave_out(format!(
+                    "the compiler scales all masses to {total} kg in all (settotalmass): the new mass properties of body `{name}` \
+                     are not written"
+                ));
+                continue;
+            }
             match node.children().find(|n| n.has_tag_name("inertial")) {
                 Some(inertial) => self.write_inertial(&name, inertial, mass, center)?,
                 None => self.write_inertial_of_geoms(i, &name, node, mass, center, moments)?,
@@ -131,13 +147,6 @@ impl Writer<'_, '_> {
             ));
             return Ok(());
         };
-        if self.elements.compiler("inertiafromgeom") == Some("true") {
-            self.leave_out(format!(
-                "the compiler takes the mass of body `{name}` from its geoms (inertiafromgeom=\"true\"): its new mass \
-                 properties are not written"
-            ));
-            return Ok(());
-        }
         let was = MassProperties::of_geoms(&masses);
         let names = &self.native.plant.layout.geoms;
         let first = self.native.plant.geoms.iter().position(|g| g.body == i);

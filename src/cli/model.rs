@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use asid_core::{Backend, Error, Layout, Model, Parameter, Result, Scene, Task};
 use asid_effects::EffectSpec;
-use asid_effects::refined::Refined;
+use asid_effects::refined::{Refined, as_compiled};
 use asid_effects::refined_model::RefinedModel;
 use asid_mjcf::Plant;
 
@@ -35,7 +35,7 @@ pub fn refine(
     if source.parameters.is_empty() && source.effects.is_empty() && more.is_empty() {
         return Ok(model);
     }
-    let plant = Arc::new(Plant::of(scene)?);
+    let plant = Arc::new(as_compiled(&Plant::of(scene)?, &*model, scene.name())?);
     let effects = [&source.effects[..], more].concat();
     Ok(Refined::new(
         backend,

@@ -54,6 +54,18 @@ pub(super) fn sentences(plant: &Plant, request: &LimitRequest) -> Vec<String> {
             "only motors, position and velocity servos of hinges and slides are checked",
         );
     }
+    let limited =
+        |name: &String| request.force.contains_key("") || request.force.contains_key(name);
+    let pairs = layout.actuators.iter().zip(&plant.drives);
+    let late =
+        pairs.filter(|(a, drive)| limited(&a.name) && drive.is_some_and(|d| !d.is_memoryless()));
+    let late: Vec<&str> = late.map(|(a, _)| &*a.name).collect();
+    if !late.is_empty() {
+        all.push(format!(
+            "the limit of force of {} is checked as if the drive had no filter and no delay",
+            late.join(", ")
+        ));
+    }
     all
 }
 

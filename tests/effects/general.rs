@@ -42,6 +42,36 @@ fn engines_for_general(effect: &str) -> Vec<Box<dyn asid::core::Backend>> {
     engines.filter(|b| b.load(&scene).is_ok()).collect()
 }
 
+/// Symptom: an exported gain was a fifth of the right one, and limits of force were at a fifth of the
+/// force.
+///
+/// Cause: a default class has one actuator for all kinds, and only what it says of the own kind was
+/// read.
+#[test]
+fn a_class_says_of_any_kind_of_actuator_what_it_says_of_one() {
+    let of_class =
+        r#"<default><motor gear="5" forcerange="-3 3"/><position kp="7"/></default><worldbody>"#;
+    for own in [
+        r#"<position name="drive" joint="spin" kp="2"/>"#,
+        r#"<general name="drive" joint="spin" gainprm="2"/>"#,
+        r#"<velocity name="drive" joint="spin" kv="2"/>"#,
+    ] {
+        let xml = machine(own).replace("<worldbody>", of_class);
+        let scene = super::bench::scene(&xml);
+        let drive = Plant::of(&scene).unwrap().drives[0].unwrap();
+        assert_eq!(drive.force_range, Some([-3.0, 3.0]), "{own}");
+        for backend in engines_for_general("actuator-gain") {
+            let model = backend.load(&scene).unwrap();
+            let gear = Target::new("actuator", "drive", "gear", 0);
+            let gear = model.nominal(&gear).unwrap();
+            assert!(
+                (drive.gear.abs() / 5.0) >= 1.0 && gear == 5.0,
+                "{own}: {drive:?} {gear}"
+            );
+        }
+    }
+}
+
 #[test]
 fn general_actuators_have_the_sites_of_their_short_forms() {
     for forms in PAIRS {

@@ -32,6 +32,21 @@ pub(super) struct Causes {
     pub(super) own: BTreeMap<String, f64>,
 }
 
+impl Causes {
+    /// The items of each cause, by the name under which its gap stands: that of its first item.
+    pub(super) fn by_name(&self) -> Vec<(String, Vec<Item>)> {
+        let mut all: Vec<(String, Vec<Item>)> = Vec::new();
+        for item in &self.items {
+            let name = item.label();
+            match all.last_mut() {
+                Some((_, items)) if !self.own.contains_key(&name) => items.push(item.clone()),
+                _ => all.push((name, vec![item.clone()])),
+            }
+        }
+        all
+    }
+}
+
 /// The dirt of a case, and its excess gap.
 pub(super) struct Background {
     pub(super) items: Vec<Item>,

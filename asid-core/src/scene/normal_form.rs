@@ -32,6 +32,7 @@ pub(super) fn normal_form<'x>(name: &str, xml: &'x str) -> Result<Cow<'x, str>, 
         edits: Edits::default(),
     };
     writer.first_orders();
+    writer.unread();
     writer.actuators();
     for world in root.children().filter(|n| n.has_tag_name("worldbody")) {
         writer.parts(world, Around::default())?;
@@ -68,6 +69,27 @@ pub(super) fn attached_last(
     Ok(())
 }
 
+/// Elements of a class that set its actuator (MuJoCo, XML reference, `default`).
+const ACTUATORS: [&str; 9] = [
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+];
+/// Attributes that mean the same in all kinds of actuator.
+const OF_ANY_ACTUATOR: [&str; 5] = [
+    "gear",
+    "ctrlrange",
+    "forcerange",
+    "ctrllimited",
+    "forcelimited",
+];
+
 /// What is around an element.
 #[derive(Clone, Copy, Default)]
 struct Around<'d> {
@@ -98,15 +120,41 @@ impl<'d> Writer<'d> {
         }
     }
 
-    /// Completes the coefficients of actuators from what their classes say of `<general>`, which
-    /// holds for all kinds.
+    /// Writes bit masks below zero as the masks that they are, and removes how a body may sleep,
+    /// which changes no motion.
+    fn unread(&mut self) {
+        for node in self.root.descendants().filter(Node::is_element) {
+            for attribute in ["contype", "conaffinity"] {
+                let mask = node.attribute(attribute).map(str::trim);
+                let negative = mask.and_then(|x| x.parse::<i32>().ok()).filter(|x| *x < 0);
+                if let Some(mask) = negative {
+                    let mask = mask.cast_unsigned().to_string();
+                    self.edits.set(node, attribute, &mask);
+                }
+            }
+            if node.has_tag_name("body") {
+                self.edits.remove(node, "sleep");
+            }
+        }
+    }
+
+    /// Completes actuators from what their classes say of any kind of actuator: a class has one
+    /// actuator for all kinds. Coefficients come from `<general>` alone, since the other kinds state
+    /// them under names of their own.
     fn actuators(&mut self) {
         let sections = self.root.children().filter(|n| n.has_tag_name("actuator"));
         let all = sections.flat_map(|s| s.children());
         for node in all.filter(Node::is_element) {
-            let sources = self.sources(node, "general", None);
+            let sources = self.sources(node, &["general"], None);
             for attribute in ["gainprm", "biasprm"] {
                 self.list(node, &sources, attribute);
+            }
+            let sources = self.sources(node, &ACTUATORS, None);
+            for attribute in OF_ANY_ACTUATOR {
+                let said = said(&sources, attribute);
+                if let (false, Some(value)) = (node.has_attribute(attribute), said) {
+                    self.edits.set(node, attribute, value);
+                }
             }
         }
     }
@@ -131,7 +179,7 @@ impl<'d> Writer<'d> {
                 "inertial" => self.place(child, &[child], around)?,
                 "joint" => self.joint(child, around)?,
                 "geom" | "site" => {
-                    let sources = self.sources(child, tag, around.class);
+                    let sources = self.sources(child, &[tag], around.class);
                     self.list(child, &sources, "friction");
                     self.list(child, &sources, "size");
                     self.place(child, &sources, around)?;
@@ -149,9 +197,14 @@ impl<'d> Writer<'d> {
         Ok(())
     }
 
-    /// The elements that say something of `node`, what counts first: itself, then those of `tag` in
-    /// its class and in the classes around that.
-    fn sources(&self, node: Node<'d, 'd>, tag: &str, around: Option<&str>) -> Vec<Node<'d, 'd>> {
+    /// The elements that say something of `node`, what counts first: itself, then those of some `tags`
+    /// in its class and in the classes around that.
+    fn sources(
+        &self,
+        node: Node<'d, 'd>,
+        tags: &[&str],
+        around: Option<&str>,
+    ) -> Vec<Node<'d, 'd>> {
         let is_default = |n: &Node<'d, 'd>| n.has_tag_name("default");
         let sections = || self.root.children().filter(is_default);
         let named = node.attribute("class").or(around).and_then(|class| {
@@ -163,7 +216,7 @@ impl<'d> Writer<'d> {
         let classes = within.filter(is_default).chain(sections().rev());
         let said = classes.flat_map(|class| class.children().rev());
         std::iter::once(node)
-            .chain(said.filter(|n| n.has_tag_name(tag)))
+            .chain(said.filter(|n| tags.contains(&n.tag_name().name())))
             .collect()
     }
 
@@ -235,7 +288,7 @@ impl<'d> Writer<'d> {
             return Ok(());
         };
         self.inherit(node, "class", around);
-        let sources = self.sources(node, "joint", around.class);
+        let sources = self.sources(node, &["joint"], around.class);
         if said(&sources, "type") == Some("free") {
             return Ok(());
         }

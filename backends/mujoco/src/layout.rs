@@ -2,7 +2,7 @@
 
 use asid_core::layout::{Actuator, Joint, JointKind, Keyframe, Layout, Sensor};
 use asid_core::{Error, Result};
-use mujoco_rs::mujoco_c::{mjtJoint, mjtSensor};
+use mujoco_rs::mujoco_c::{mjtDisableBit, mjtJoint, mjtSensor};
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
 
 /// Reads the layout of a model compiled from the scene `name`.
@@ -41,10 +41,12 @@ pub fn layout(name: &str, model: &MjModel) -> Result<Layout> {
             qvel: model.jnt_dofadr()[i] as usize,
         })
         .collect();
+    let clamps = model.opt().disableflags & mjtDisableBit::mjDSBL_CLAMPCTRL as i32 == 0;
     let actuators = count(model.nu())
         .map(|i| Actuator {
             name: named(MjtObjBase::mjOBJ_ACTUATOR, "actuator", i),
-            ctrl_range: model.actuator_ctrllimited()[i].then(|| model.actuator_ctrlrange()[i]),
+            ctrl_range: (clamps && model.actuator_ctrllimited()[i])
+                .then(|| model.actuator_ctrlrange()[i]),
         })
         .collect();
     let sensors = count(model.nsensor())

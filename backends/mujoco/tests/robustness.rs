@@ -274,6 +274,43 @@ fn assets_are_found_beside_the_document() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
+/// Symptom: a valid model was refused, or one of the same name in the working folder taken.
+///
+/// Cause: MuJoCo opens attached models while it parses, before it was told the model's folder.
+#[test]
+fn attached_models_are_found_beside_the_document() {
+    let folder = std::env::temp_dir().join(format!("asid-attach-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let leg = r#"<mujoco><worldbody><body name="leg"><joint name="hip"/><geom size="0.1"/></body></worldbody></mujoco>"#;
+    std::fs::write(folder.join("sub.xml"), leg).unwrap();
+    let path = folder.join("robot.xml");
+    let robot = r#"<mujoco><asset><model name="s" file="sub.xml"/></asset><worldbody>
+        <body name="r"><freejoint/><geom size="0.1"/><attach model="s" body="leg" prefix="A_"/></body></worldbody></mujoco>"#;
+    std::fs::write(&path, robot).unwrap();
+    let scene = asid_core::Scene::from_file(&path).unwrap();
+    let backend = asid_mujoco::MujocoBackend::new().unwrap();
+    let model = asid_core::Backend::load(&backend, &scene).unwrap();
+    assert!(model.layout().joint("A_hip").is_ok());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Symptom: an effect on one joint halved the drive of another.
+///
+/// Cause: effects clamp commands, and the model says that they are not to be.
+#[test]
+fn commands_have_no_range_where_the_model_turns_clamping_off() {
+    let range = |flag: &str| {
+        let model = load(&format!(
+            r#"<mujoco><option><flag {flag}/></option><worldbody><body><joint name="j"/><geom size="0.1"/></body></worldbody>
+            <actuator><motor name="m" joint="j" ctrlrange="-1 1"/></actuator></mujoco>"#
+        ));
+        let all = &model.layout().actuators;
+        all.iter().any(|a| a.ctrl_range.is_some())
+    };
+    assert!(range(r#"clampctrl="enable""#));
+    assert!(!range(r#"clampctrl="disable""#));
+}
+
 #[test]
 fn sizes_and_arrays_that_do_not_fit_are_errors() {
     let model = load(ARM);

@@ -337,7 +337,8 @@ fn efforts(
 /// The sets to replay, and whether the first of them is the set that stands.
 ///
 /// They are the set that stands, if it was fitted, `rivals` in descending order of evidence, and
-/// the set of the `known` candidates.
+/// the set of the `known` candidates. Sets that contain the one that stands are no rivals of it, and
+/// come after all others.
 fn replayed_sets(
     outcome: &Outcome,
     mut sets: Vec<Set>,
@@ -348,6 +349,10 @@ fn replayed_sets(
     if let Some(place) = stands {
         sets.remove(place);
         sets.insert(0, outcome.best.clone());
+    }
+    let holds_it = |s: &Set| stands.is_some() && best.iter().all(|c| s.candidates.contains(c));
+    if let Some(others) = sets.get_mut(usize::from(stands.is_some())..) {
+        others.sort_by_key(holds_it);
     }
     // A twin is always a rival, even if time is out.
     let is_level = |s: &Set| (s.fitted.evidence - outcome.best.fitted.evidence).abs() < LEVEL;

@@ -81,10 +81,12 @@ impl Search<'_> {
         }
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         let of_taken = first.confirmed.iter().find(|s| s.candidates == *taken)?;
-        let last = path.rounds.last()?;
         let names = path.best.names.count();
         let earns = |s: &Set| s.names.count() > names && s.rises_above(&path.best, self.threshold);
-        let is_left = last.base == path.best.candidates && last.confirmed.iter().any(earns);
+        // A name that earns its evidence is a trial base in the round after, which is then the last.
+        let mut upon_best = path.rounds.iter();
+        let is_left =
+            upon_best.any(|r| r.base == path.best.candidates && r.confirmed.iter().any(earns));
         let near = |s: &&Set| {
             s.candidates != *taken
                 && !has_tolerances(self.candidates, s)

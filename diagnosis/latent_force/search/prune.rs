@@ -114,7 +114,36 @@ pub(super) fn pruned(
         };
         if stands {
             set = smaller;
+        } else if !slight && out.len() > 1 {
+            set = without_one_by_one(context, candidates, (set, out), (breadth, progress))?;
         }
+    }
+    Ok(set)
+}
+
+/// Removes members that have no effect one after the other, until one is needed.
+///
+/// Two members may stand in for each other: neither has an effect beside the other, and one of them
+/// has.
+fn without_one_by_one(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    (set, mut open): (Set, Vec<usize>),
+    (breadth, progress): (Breadth, &dyn Progress),
+) -> Result<Set> {
+    let mut set = set;
+    while !open.is_empty() && !progress.is_stopped() {
+        let change = |c: usize| change_without(candidates, &set, &[c]).unwrap_or(f64::NEG_INFINITY);
+        let changes = open.iter().map(|&c| change(c)).enumerate();
+        let Some((place, _)) = changes.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            break;
+        };
+        let mut smaller = without(&set, candidates, open.remove(place));
+        smaller.fit(context, (breadth.rounds[1], progress))?;
+        if smaller.fitted.evidence <= set.fitted.evidence - IDLE_LOSS {
+            break;
+        }
+        set = smaller;
     }
     Ok(set)
 }

@@ -2,12 +2,20 @@
 
 use asid_core::Result;
 
+use crate::latent_force::screen::Screened;
+
 use super::finish::Fits;
 use super::has_tolerances;
 use super::round::Upon;
 use super::screening::Look;
 use super::set::{Set, name_of};
 use super::tolerances::Tolerances;
+
+/// Evidence, in nats, by which a set may end below the base that it contains: a value that the logs
+/// tell to a millionth of its prior costs 14.
+const LOST: f64 = 15.0;
+/// Share of the screened coefficients of the added effects with which such a set begins again.
+const NEARER: f64 = 0.1;
 
 impl Upon<'_> {
     /// Fits the leading sets of a screening briefly, and tolerances too unless they are far behind.
@@ -49,11 +57,15 @@ impl Upon<'_> {
                 continue;
             }
             progress.note(&format!("trying {}", name_of(self.candidates, &members)));
+            let is_screened = due.elsewhere.is_none();
             let mut set = match due.elsewhere {
                 Some(set) => self.with_starts(set.clone())?,
                 None => self.begun(look, s)?,
             };
             set.fit(self.context, (breadth.rounds[0], progress))?;
+            if !self.base.candidates.is_empty() && is_screened {
+                set = self.unless_lost(set, (look, s))?;
+            }
             if set.fitted.evidence + set.fitted.promised > self.base.fitted.evidence {
                 risen += 1;
                 progress.advance(1);
@@ -68,6 +80,27 @@ impl Upon<'_> {
         }
         sets.extend(self.tried(near)?);
         Ok(Fits { sets, left_out })
+    }
+
+    /// A set that was fitted briefly, or a fit of it that begins nearer to the base if that is better.
+    ///
+    /// A set contains its base. If its fit has ended far below, its first step was too long.
+    fn unless_lost(&self, set: Set, (look, s): (&Look, &Screened)) -> Result<Set> {
+        let reached = set.fitted.evidence + set.fitted.promised;
+        if reached >= self.base.fitted.evidence - LOST || self.progress.is_stopped() {
+            return Ok(set);
+        }
+        let near = Screened {
+            base: vec![0.0; s.base.len()],
+            coefficients: (s.coefficients.iter())
+                .map(|all| all.iter().map(|c| NEARER * c).collect())
+                .collect(),
+            ..s.clone()
+        };
+        let mut again = self.begun(look, &near)?;
+        again.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+        let is_better = again.fitted.evidence > set.fitted.evidence;
+        Ok(if is_better { again } else { set })
     }
 
     /// Tolerances added to the base and fitted briefly, if there are any.

@@ -138,6 +138,12 @@ impl Upon<'_> {
             let mut set = leading.beside(self.base, self.candidates);
             set.fit(self.context, (self.breadth.rounds[1], progress))?;
             if progress.is_stopped() || self.earns_its_place(&set)? {
+                if progress.is_stopped() {
+                    untried.push(Untried {
+                        stage: "confirmation of what leads in screening",
+                        sets: Vec::new(),
+                    });
+                }
                 progress.end();
                 return Ok(screening.round(self, screened, (Vec::new(), vec![set]), tolerances));
             }

@@ -12,7 +12,7 @@ use asid_core::Episode;
 use asid_core::posterior::Direction;
 use asid_core::signal::Signal;
 use asid_report::number::significant;
-use asid_sysid::design::Designed;
+use asid_sysid::design::{Designed, Designer};
 use asid_sysid::method::Method;
 use serde::Serialize;
 
@@ -245,8 +245,8 @@ pub fn lines(result: &ExploreResult) -> Vec<String> {
     all.extend(result.notes.iter().cloned());
     all.push(match &result.broken {
         None => {
-            let mut line =
-                "all limits hold, at the ends and corners of the unknowns' ranges too".to_owned();
+            let entries = result.unknowns.len() + result.nuisance.len();
+            let mut line = format!("all limits hold, {}", Designer::checked_at(entries));
             if let Some(next) = &result.next_limit {
                 line += &format!("; a motion larger by a quarter would break: {next}");
             }

@@ -6,6 +6,7 @@ use anyhow::Result;
 use asid_core::layout::JointKind;
 use asid_core::signal::Signal;
 use asid_core::{Error, Scene};
+use asid_effects::refined::as_compiled;
 use asid_mjcf::markup::escaped;
 use asid_sysid::dataset::Dataset;
 
@@ -64,7 +65,8 @@ pub fn with_sensors(subject: Subject, notes: &mut Vec<String>) -> Result<Subject
         "the model has no sensors: the position of each joint is read, by the joint's name".into(),
     );
     let compiled = subject.backend.load(&scene)?;
-    let mut plant = asid_mjcf::Plant::of(&scene)?;
+    let plant = asid_mjcf::Plant::of(&scene)?;
+    let mut plant = as_compiled(&plant, &*compiled, scene.name())?;
     plant.layout = compiled.layout().clone();
     let mut source = subject.source;
     source.scene = scene;

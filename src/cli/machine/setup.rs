@@ -4,6 +4,8 @@
 use anyhow::Result;
 use asid_core::signal::Signal;
 use asid_core::{Error, Parameter, Progress, Streams, Target};
+use asid_mjcf::plant::DriveLaw;
+use asid_sysid::check_scales;
 use asid_sysid::dataset::Dataset;
 use asid_sysid::design::{Designed, Designer};
 use asid_sysid::limits::Limits;
@@ -48,6 +50,7 @@ impl<'a> Setup<'a> {
     pub fn new(subject: &'a Subject, config: &Config, threads: usize) -> Result<Self> {
         let mut notes = Vec::new();
         let parameters = config.parameters(subject)?;
+        check_scales(&parameters)?;
         let sought = config.sought(subject);
         let plant = &subject.plant;
         let limits = Limits::new(plant, &|j| range_of(subject, j), &config.limits()?)?;
@@ -216,10 +219,14 @@ fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
             let range = limit.and_then(|l| l.position);
             let range = range.map(|range| scaled(range, drive.gear));
             width = width.min(reach(range, base));
-        } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
+        }
+        let force = limits.drives.iter().find(|d| d.actuator == a);
+        // Only a motor's command is its force.
+        if let (DriveLaw::Motor, Some(force)) = (drive.law, force) {
             width = width.min(force.force / drive.gear.abs());
         }
-        let is_bounded = limit.is_some_and(|l| l.position.is_some() || l.speed.is_some());
+        let is_bounded =
+            force.is_some() || limit.is_some_and(|l| l.position.is_some() || l.speed.is_some());
         if width.is_finite() || is_bounded {
             width
         } else {

@@ -7,6 +7,7 @@ use anyhow::Result;
 use asid_core::{Backend, Episode, Error, Model};
 use asid_diagnosis::study::Study;
 use asid_effects::RefinedModel;
+use asid_effects::refined::as_compiled;
 use asid_mjcf::Plant;
 use asid_readings::first_row::Followers;
 use asid_sysid::start::start_of;
@@ -65,8 +66,12 @@ impl Subject {
         };
         let backend = backend(&engine.map_or_else(default_backend, str::to_owned))?;
         let compiled = backend.load(&source.scene)?;
-        let mut plant = Plant::of(&source.scene)?;
+        let plant = Plant::of(&source.scene)?;
+        let mut plant = as_compiled(&plant, &*compiled, source.scene.name())?;
         plant.layout = compiled.layout().clone();
+        for (target, value) in &source.parameters {
+            plant.set(target, [compiled.nominal(target)?, *value]);
+        }
         let model = refine(&*backend, compiled, &source.scene, &source, &[])?;
         if let Some(study) = &mut study {
             open_first_rows(&*model, &plant, study)?;
