@@ -48,8 +48,8 @@ fn masses_and_centres_are_those_that_the_engine_has_compiled() {
                     let target = asid::core::Target::new("body", name, attribute, i);
                     model.nominal(&target).unwrap()
                 };
-                near(plant.bodies[body].mass, nominal("mass", 0), 1e-9);
-                near(plant.bodies[body].center[2], nominal("ipos", 2), 1e-9);
+                near(name, plant.bodies[body].mass, nominal("mass", 0), 1e-9);
+                near(name, plant.bodies[body].center[2], nominal("ipos", 2), 1e-9);
             }
         }
     }
