@@ -69,8 +69,9 @@ impl Search<'_> {
     /// the set that was taken.
     ///
     /// The set must be nearly as likely as the one taken: the difference is below the threshold of
-    /// a name. Any distance is allowed if the path ends although a further name earns its evidence,
-    /// since the set that was taken may have left that evidence.
+    /// a name. Any distance is allowed if the rounds of the path are used up although a further name
+    /// earns its evidence, since the set that was taken may have left that evidence. A name that earns
+    /// its evidence and makes up for too little is no reason: small errors of a machine do too.
     pub(super) fn second(&self, path: &Path) -> Option<Set> {
         let [first, further, ..] = &path.rounds[..] else {
             return None;
@@ -81,12 +82,10 @@ impl Search<'_> {
         }
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         let of_taken = first.confirmed.iter().find(|s| s.candidates == *taken)?;
+        let last = path.rounds.last()?;
         let names = path.best.names.count();
         let earns = |s: &Set| s.names.count() > names && s.rises_above(&path.best, self.threshold);
-        // A name that earns its evidence is a trial base in the round after, which is then the last.
-        let mut upon_best = path.rounds.iter();
-        let is_left =
-            upon_best.any(|r| r.base == path.best.candidates && r.confirmed.iter().any(earns));
+        let is_left = last.base == path.best.candidates && last.confirmed.iter().any(earns);
         let near = |s: &&Set| {
             s.candidates != *taken
                 && !has_tolerances(self.candidates, s)
