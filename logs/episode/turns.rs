@@ -184,7 +184,7 @@ mod tests {
     fn noise_at_the_end_of_a_turn_is_no_turn() {
         // At rest there, readings go to and fro between the two ends.
         let mut log: Vec<f64> = (0..100)
-            .map(|k| wrapped(3.14159 + 0.001 * f64::from(k % 3 - 1), -TAU / 2.0))
+            .map(|k| wrapped(TAU / 2.0 + 0.001 * f64::from(k % 3 - 1), -TAU / 2.0))
             .collect();
         assert!(unwrap(&mut log, TAU, None) > 20);
         let apart = log.iter().map(|x| (x - log[0]).abs()).fold(0.0, f64::max);
