@@ -93,14 +93,16 @@ fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
         .map_or_else(|| DMatrix::identity(n, n), |c| c.inverse())
 }
 
+/// The 97.5 % quantiles of Student's distribution with one to ten degrees of freedom.
+const FEW: [f64; 10] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
+];
+
 /// The 97.5 % quantile of Student's distribution with some degrees of freedom.
 ///
 /// From the eleventh on by the first terms of its expansion about the normal one (Cornish and
 /// Fisher), right to a thousandth.
 fn student_975(degrees: usize) -> f64 {
-    const FEW: [f64; 10] = [
-        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
-    ];
     let z = 1.959_964_f64;
     let n = degrees as f64;
     let more = (z.powi(3) + z) / (4.0 * n)

@@ -142,34 +142,7 @@ impl Config {
         worlds: &Worlds,
     ) -> Result<(Self, Vec<Parameter>)> {
         let Worlds { simulator, real } = worlds;
-        let mut table = configured(common)?;
-        difficulty::forget_noise(task, &mut table)?;
-        // A start pose of another stage does not apply to this one.
-        if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
-            table.remove("start");
-        }
-        for assignment in &common.set {
-            if assignment.trim_start().starts_with("plugins") {
-                return Err(wrong("plugins", "is given by --plugin FILE, not by --set"));
-            }
-            set(&mut table, assignment)?;
-        }
-        for key in table.keys() {
-            if !KEYS.contains(&key.as_str()) {
-                return Err(Error::unknown("setting", key, KEYS).into());
-            }
-        }
-        if let Some(name) = text(&table, "task")?
-            && name != task.name()
-        {
-            return Err(wrong(
-                "task",
-                format!(
-                    "the configuration is for `{name}`, the command for `{}`",
-                    task.name()
-                ),
-            ));
-        }
+        let table = table_of(stage, task, common)?;
         let backend = match (&common.backend, text(&table, "backend")?) {
             (Some(name), _) => name.clone(),
             (None, Some(name)) => name,
@@ -307,6 +280,39 @@ impl Config {
         }
         recorded(used(&files))
     }
+}
+
+/// The table of all settings of a task for a stage: the file's, then those of `--set`.
+fn table_of(stage: Stage, task: &dyn Task, common: &Common) -> Result<toml::Table> {
+    let mut table = configured(common)?;
+    difficulty::forget_noise(task, &mut table)?;
+    // A start pose of another stage does not apply to this one.
+    if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
+        table.remove("start");
+    }
+    for assignment in &common.set {
+        if assignment.trim_start().starts_with("plugins") {
+            return Err(wrong("plugins", "is given by --plugin FILE, not by --set"));
+        }
+        set(&mut table, assignment)?;
+    }
+    for key in table.keys() {
+        if !KEYS.contains(&key.as_str()) {
+            return Err(Error::unknown("setting", key, KEYS).into());
+        }
+    }
+    if let Some(name) = text(&table, "task")?
+        && name != task.name()
+    {
+        return Err(wrong(
+            "task",
+            format!(
+                "the configuration is for `{name}`, the command for `{}`",
+                task.name()
+            ),
+        ));
+    }
+    Ok(table)
 }
 
 /// The explorer, with the file of `--policy`.

@@ -1,6 +1,6 @@
 //! Mass, gravity and forces of moving bodies.
 
-use super::bench::{Bench, engines_for, near, on_each};
+use super::bench::{Bench, engines_for, engines_that_load, near, on_each};
 
 const G: f64 = 9.81;
 const DT: f64 = 0.002;
@@ -39,7 +39,7 @@ fn masses_and_centres_are_those_that_the_engine_has_compiled() {
             r#"<geom size="0.1" pos="0 0 0.3" mass="0.7" contype="0"/><inertial pos="0 0 -0.1""#,
         );
         let scene = super::bench::scene(&xml);
-        for backend in engines_for("constant-force@flap:z=1") {
+        for backend in engines_that_load("constant-force@flap:z=1", &xml) {
             let model = backend.load(&scene).unwrap();
             let plant = asid::mjcf::Plant::of(&scene).unwrap();
             let plant = asid::effects::refined::as_compiled(&plant, &*model, "cart").unwrap();
