@@ -4,6 +4,7 @@
 
 mod arm;
 mod ball;
+mod between_steps;
 mod beyond;
 mod coupled_finger;
 #[path = "../diagnosis_support/mod.rs"]

@@ -50,7 +50,7 @@ pub fn machine_log<S, U>(
         let time = row * k as f64;
         let u = command(time);
         let start = if k == 0 { begins } else { &open };
-        let _ = write!(text, "\n{time:.3},{},{start}", read(&u, &state));
+        let _ = write!(text, "\n{time:.6},{},{start}", read(&u, &state));
         for _ in 0..steps {
             state = step(state, &u, row / f64::from(steps));
         }
