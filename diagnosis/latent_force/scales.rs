@@ -87,6 +87,12 @@ impl Scales {
         joints.chain(&self.alone).any(holds)
     }
 
+    /// Whether several joints have scales of their own.
+    #[must_use]
+    pub fn has_several_joints(&self) -> bool {
+        self.joints.len() > 1
+    }
+
     /// Regressions at common scales, and those on some columns at the scales of one joint.
     #[cfg(test)]
     pub fn known(common: Vec<Regression>, joints: Vec<(Vec<usize>, Vec<Regression>)>) -> Self {

@@ -149,7 +149,7 @@ impl Ranking<'_> {
                 let own = [first, second].map(|s| self.columns.forms[s.forms[0]].columns());
                 let own: Vec<usize> = own.into_iter().flatten().collect();
                 if which == Pairs::BeyondTheSum && !self.scales.at_one_joint(&own) {
-                    if place < FIRSTS {
+                    if place < FIRSTS && self.scales.has_several_joints() {
                         let pair = self.screened(&[first.forms[0], second.forms[0]], 2);
                         let least = apart.as_ref().map_or(lead + MORE, |best| best.worth(price));
                         if pair.worth(price) > least {
