@@ -87,12 +87,6 @@ impl Scales {
         joints.chain(&self.alone).any(holds)
     }
 
-    /// Whether several joints have scales of their own.
-    #[must_use]
-    pub fn has_several_joints(&self) -> bool {
-        self.joints.len() > 1
-    }
-
     /// Regressions at common scales, and those on some columns at the scales of one joint.
     #[cfg(test)]
     pub fn known(common: Vec<Regression>, joints: Vec<(Vec<usize>, Vec<Regression>)>) -> Self {
@@ -142,66 +136,7 @@ impl Scales {
         let none = (f64::NEG_INFINITY, Vec::new());
         common
             .chain(at_joints)
-            .chain(self.apart(columns, which))
             .fold(none, |best, next| if next.0 > best.0 { next } else { best })
-    }
-
-    /// Returns the evidence of columns that reach several joints one by one, each joint at a scale of
-    /// its own, with coefficients; `None` if some reach several joints, or all reach one.
-    ///
-    /// What is missing at one joint is independent of what is missing at another. So their gains
-    /// over the present model's columns add up.
-    fn apart(&self, columns: &Columns, which: &[usize]) -> Option<(f64, Vec<f64>)> {
-        let is_base = |c: &usize| *c < columns.base;
-        let base: Vec<usize> = which.iter().copied().filter(is_base).collect();
-        let mut parts: Vec<(&AtJoint, Vec<usize>)> = Vec::new();
-        for c in which.iter().filter(|c| !is_base(c)) {
-            let mut joints = self.joints.iter();
-            let joint = joints.find(|j| j.columns.binary_search(c).is_ok())?;
-            match parts.iter_mut().find(|(own, _)| std::ptr::eq(*own, joint)) {
-                Some((_, own)) => own.push(*c),
-                None => parts.push((joint, vec![*c])),
-            }
-        }
-        if parts.len() < 2 {
-            return None;
-        }
-        // The evidence of some columns in a regression whose columns are `all`.
-        let of = |sum: &Regression, all: Option<&[usize]>, own: &[usize]| {
-            let place = |c: &usize| all.map_or(Some(*c), |all| all.binary_search(c).ok());
-            let places: Option<Vec<usize>> = own.iter().map(place).collect();
-            let pick = |i: usize| all.map_or(i, |all| all[i]);
-            let n = sum.gram.nrows();
-            let center: Vec<f64> = (0..n).map(|i| columns.center[pick(i)]).collect();
-            let bounds: Vec<[f64; 2]> = (0..n).map(|i| columns.bounds[pick(i)]).collect();
-            let found = evidence(&sum.gram, &sum.moment, &places?, &center, &bounds);
-            Some((sum.log_likelihood + found.gain, found.coefficients))
-        };
-        let as_they_are = self.common.first()?;
-        let (none, of_base) = of(as_they_are, None, &base)?;
-        let mut total = none;
-        let mut coefficients = vec![0.0; which.len()];
-        let mut put = |c: usize, by: f64| {
-            let place = which.iter().position(|w| *w == c);
-            place
-                .into_iter()
-                .for_each(|place| coefficients[place] += by);
-        };
-        base.iter().zip(&of_base).for_each(|(&c, &x)| put(c, x));
-        for (joint, part) in parts {
-            let own = [&base[..], &part].concat();
-            let scaled = joint
-                .sums
-                .iter()
-                .filter_map(|sum| of(sum, Some(&joint.columns), &own));
-            let all = scaled.chain(of(as_they_are, None, &own));
-            let (gained, found) = all.max_by(|a, b| a.0.total_cmp(&b.0))?;
-            total += gained - none;
-            for (place, (&c, &x)) in own.iter().zip(&found).enumerate() {
-                put(c, x - of_base.get(place).copied().unwrap_or(0.0));
-            }
-        }
-        Some((total, coefficients))
     }
 }
 

@@ -20,12 +20,10 @@ const PAIRS: usize = 3;
 /// Which pairs of candidates are offered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pairs {
-    /// Two candidates at one joint that together earn more evidence than the sum of the two, and the
-    /// best two of different joints if they are worth more than every single candidate and group.
+    /// Two candidates at one joint that together earn more evidence than the sum of the two.
     ///
     /// Two frictions are an example: fitted alone, each leaves the force of the other to the noise
-    /// model. A pair that is no better than the sum is found one name after the other, unless
-    /// something stands in for both: a group, or an effect on all joints.
+    /// model. A pair that is no better than the sum is found one name after the other.
     BeyondTheSum,
     /// Two candidates at any joints that together earn more evidence than the better one.
     ///
@@ -129,33 +127,20 @@ impl Ranking<'_> {
         names.into_iter().filter_map(group).collect()
     }
 
-    /// Returns the best pairs; a further name costs `price`, and the best of the others is worth
-    /// `lead`.
-    fn pairs(
-        &self,
-        singles: &[Screened],
-        lead: f64,
-        (which, price): (Pairs, f64),
-    ) -> Vec<Screened> {
+    /// Returns the best pairs; a further name costs `price`.
+    fn pairs(&self, singles: &[Screened], (which, price): (Pairs, f64)) -> Vec<Screened> {
         let mut order: Vec<&Screened> = singles.iter().collect();
         order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let (mut pairs, mut apart) = (Vec::new(), None::<Screened>);
+        let mut pairs = Vec::new();
         for (i, first) in order.iter().take(FIRSTS).enumerate() {
             let last = match which {
                 Pairs::BeyondTheSum => order.len(),
                 Pairs::BeyondTheBetter => order.len().min(FIRSTS),
             };
-            for (place, second) in order.iter().enumerate().take(last).skip(i + 1) {
+            for second in &order[(i + 1).min(last)..last] {
                 let own = [first, second].map(|s| self.columns.forms[s.forms[0]].columns());
                 let own: Vec<usize> = own.into_iter().flatten().collect();
                 if which == Pairs::BeyondTheSum && !self.scales.at_one_joint(&own) {
-                    if place < FIRSTS && self.scales.has_several_joints() {
-                        let pair = self.screened(&[first.forms[0], second.forms[0]], 2);
-                        let least = apart.as_ref().map_or(lead + MORE, |best| best.worth(price));
-                        if pair.worth(price) > least {
-                            apart = Some(pair);
-                        }
-                    }
                     continue;
                 }
                 let pair = self.screened(&[first.forms[0], second.forms[0]], 2);
@@ -170,7 +155,6 @@ impl Ranking<'_> {
         }
         pairs.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         pairs.truncate(PAIRS);
-        pairs.extend(apart);
         pairs
     }
 }
@@ -194,9 +178,7 @@ pub fn rank(
     };
     let singles = ranking.singles();
     let mut all = ranking.groups(&singles);
-    let worth = all.iter().chain(&singles).map(|s| s.worth(price));
-    let lead = worth.fold(0.0, f64::max);
-    all.extend(ranking.pairs(&singles, lead, (pairs, price)));
+    all.extend(ranking.pairs(&singles, (pairs, price)));
     all.extend(singles);
     all.retain(|s| s.gain.is_finite());
     all.sort_by(|a, b| b.worth(price).total_cmp(&a.worth(price)));
@@ -334,7 +316,7 @@ mod tests {
         };
         let singles: Vec<Screened> = (0..3).map(|f| ranking.screened(&[f], 1)).collect();
         assert!(singles.iter().all(|s| s.gain < 0.0), "{singles:?}");
-        let pairs = ranking.pairs(&singles, 1e9, (Pairs::BeyondTheSum, 4.0));
+        let pairs = ranking.pairs(&singles, (Pairs::BeyondTheSum, 4.0));
         assert_eq!(pairs.len(), 1);
         let each = 0.5 * 1e4 / 101.0 - 0.5 * 101.0_f64.ln();
         assert!((pairs[0].gain - (2.0 * each - 50.0)).abs() < 1e-9);
@@ -359,7 +341,7 @@ mod tests {
         };
         let singles: Vec<Screened> = (0..2).map(|f| ranking.screened(&[f], 1)).collect();
         assert!(singles.iter().all(|s| s.gain < 0.0), "{singles:?}");
-        let pairs = ranking.pairs(&singles, 1e9, (Pairs::BeyondTheSum, 4.0));
+        let pairs = ranking.pairs(&singles, (Pairs::BeyondTheSum, 4.0));
         let each = 0.5 * 1e4 / 101.0 - 0.5 * 101.0_f64.ln();
         assert_eq!(pairs.len(), 1);
         assert!((pairs[0].gain - (2.0 * each - 50.0)).abs() < 1e-9);
