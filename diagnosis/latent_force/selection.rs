@@ -89,6 +89,17 @@ fn screened(
     all
 }
 
+/// What the decision needs of a fitted set.
+fn of_fit(plant: &Plant, outcome: &Outcome, candidates: &[Candidate], set: &Set) -> Fitted {
+    let prior = log_prior(plant, candidates, &set.candidates);
+    Fitted {
+        effects: labels(candidates, &set.candidates),
+        names: set.names.count(),
+        evidence: set.fitted.evidence - outcome.none.evidence + prior,
+        prior,
+    }
+}
+
 /// Sets that were fitted in any round and not replayed, apart from those that name nothing.
 ///
 /// Without a replay they are no verdict, and they take their share of the probability.
@@ -99,16 +110,9 @@ fn fitted(
     tried: &[Tried],
 ) -> Vec<Fitted> {
     let confirmed = outcome.rounds.iter().flat_map(|r| &r.confirmed);
-    let of = |set: &Set| {
-        let prior = log_prior(plant, candidates, &set.candidates);
-        Fitted {
-            effects: labels(candidates, &set.candidates),
-            names: set.names.count(),
-            evidence: set.fitted.evidence - outcome.none.evidence + prior,
-            prior,
-        }
-    };
-    let mut all: Vec<Fitted> = confirmed.map(of).collect();
+    let mut all: Vec<Fitted> = confirmed
+        .map(|set| of_fit(plant, outcome, candidates, set))
+        .collect();
     all.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let mut seen: BTreeSet<Vec<String>> = tried.iter().map(|t| t.effects.clone()).collect();
     seen.insert(Vec::new());
@@ -138,12 +142,12 @@ pub fn gather(
     let found = place(&outcome.best.candidates);
     let mut tried: Vec<Tried> = tried
         .map(|(set, found)| {
-            let prior = log_prior(plant, candidates, &set.candidates);
+            let of = of_fit(plant, outcome, candidates, set);
             Tried {
-                effects: labels(candidates, &set.candidates),
-                names: set.names.count(),
-                evidence: set.fitted.evidence - outcome.none.evidence + prior,
-                prior,
+                effects: of.effects,
+                names: of.names,
+                evidence: of.evidence,
+                prior: of.prior,
                 replayed: replayed(bench, &found.explanation, found.explanation.held_out),
             }
         })

@@ -192,21 +192,23 @@ fn of_json(json: Json, depth: usize) -> Value {
 mod tests {
     use super::*;
 
+    /// A topic whose messages are JSON.
+    const JSON: Described<'static> = Described {
+        kind: "any",
+        encoding: "json",
+        schema: "jsonschema",
+        text: b"",
+    };
+
     #[test]
     fn what_cannot_be_read_is_said_and_the_rest_is_read() {
         let mut topics = Topics::new(&[]);
-        let json = Described {
-            kind: "any",
-            encoding: "json",
-            schema: "jsonschema",
-            text: b"",
-        };
         let protobuf = Described {
             encoding: "protobuf",
-            ..json
+            ..JSON
         };
-        topics.push("/a", json, 5, br#"{"x": 1.5, "on": true, "parts": [1, 2]}"#);
-        topics.push("/a", json, 6, b"{");
+        topics.push("/a", JSON, 5, br#"{"x": 1.5, "on": true, "parts": [1, 2]}"#);
+        topics.push("/a", JSON, 6, b"{");
         topics.push("/b", protobuf, 5, b"");
         let log = topics.finish("log").unwrap();
         let names: Vec<&str> = log.series.iter().map(|s| &*s.name).collect();
@@ -218,15 +220,9 @@ mod tests {
     #[test]
     fn a_long_list_is_no_reading_in_json_either() {
         let mut topics = Topics::new(&[]);
-        let json = Described {
-            kind: "any",
-            encoding: "json",
-            schema: "jsonschema",
-            text: b"",
-        };
         let ranges = vec!["1.5"; LONGEST_LIST + 1].join(",");
         let message = format!(r#"{{"ranges": [{ranges}], "x": 1}}"#);
-        topics.push("/scan", json, 5, message.as_bytes());
+        topics.push("/scan", JSON, 5, message.as_bytes());
         let log = topics.finish("log").unwrap();
         assert_eq!(log.series.len(), 1);
     }

@@ -1,8 +1,10 @@
 //! Motions that are simulated: their information, and their limits.
 
+use std::sync::Arc;
+
 use asid::core::registry::{BackendEntry, find};
 use asid::core::signal::Signal;
-use asid::core::{Parameter, Scene};
+use asid::core::{Model, Parameter, Scene};
 use asid::mjcf::Plant;
 use asid::sysid::limits::{LimitRequest, Limits};
 use asid::sysid::play::Player;
@@ -57,22 +59,27 @@ fn the_information_about_a_mass_is_the_closed_form() {
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
 }
 
-/// A servo of gain `kp` with a command of 0.1 m begins with a force of 0.1 kp.
-#[test]
-fn the_force_of_a_servo_is_looked_at_with_the_gain_of_each_point() {
+/// The cart with a position servo of some gains, whose force has a limit of 15 N.
+fn servo_within_15_n(gains: &str) -> (Arc<dyn Model>, Plant, Limits) {
     let xml = NOMINAL.replace(
         r#"<motor name="belt" joint="rail" ctrlrange="-20 20"/>"#,
-        r#"<position name="belt" joint="rail" kp="100"/>"#,
+        &format!(r#"<position name="belt" joint="rail" {gains}/>"#),
     );
     let scene = Scene::from_xml("cart", &xml, &[]).unwrap();
     let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
-    let model = backend.load(&scene).unwrap();
     let plant = Plant::of(&scene).unwrap();
     let request = LimitRequest {
         force: [("belt".to_owned(), 15.0)].into(),
         ..LimitRequest::default()
     };
     let limits = Limits::new(&plant, &|_| None, &request).unwrap();
+    (backend.load(&scene).unwrap(), plant, limits)
+}
+
+/// A servo of gain `kp` with a command of 0.1 m begins with a force of 0.1 kp.
+#[test]
+fn the_force_of_a_servo_is_looked_at_with_the_gain_of_each_point() {
+    let (model, plant, limits) = servo_within_15_n(r#"kp="100""#);
     let gain = Parameter {
         name: "gain".into(),
         targets: vec!["actuator/belt/kp".parse().unwrap()],
@@ -96,21 +103,9 @@ fn the_force_of_a_servo_is_looked_at_with_the_gain_of_each_point() {
 /// Cause: the force was computed at the state after the step, when a stiff servo has moved already.
 #[test]
 fn the_force_of_a_servo_is_largest_as_its_command_begins() {
-    let servo = r#"<position name="belt" joint="rail" kp="20000" kv="200"/>"#;
-    let xml = NOMINAL.replace(
-        r#"<motor name="belt" joint="rail" ctrlrange="-20 20"/>"#,
-        servo,
-    );
-    let scene = Scene::from_xml("cart", &xml, &[]).unwrap();
-    let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
-    let model = backend.load(&scene).unwrap();
-    let plant = Plant::of(&scene).unwrap();
-    let request = LimitRequest {
-        force: [("belt".to_owned(), 15.0)].into(),
-        ..LimitRequest::default()
-    };
+    let (model, plant, limits) = servo_within_15_n(r#"kp="20000" kv="200""#);
     for substeps in [1, 5] {
-        let limits = Limits::new(&plant, &|_| None, &request).unwrap();
+        let limits = limits.clone();
         let mut player = Player::new(&*model, &plant, limits, &[], &[], (&[0.0], 0.0), 1).unwrap();
         let plays = player
             .play(&[(&[0.001, 0.001, 0.001], &[])], substeps)
