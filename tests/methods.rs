@@ -8,12 +8,18 @@ mod cart_support;
 #[allow(dead_code)]
 mod task_support;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use asid::algorithms::explore::open_loop::{Planned, Planner};
+use asid::algorithms::explore::reused::{Plans, Reused};
 use asid::algorithms::identify::expected::ExpectedSettings;
+use asid::core::explore::{CurvePoint, Explored};
 use asid::core::parameter::Scale;
 use asid::core::registry::{
     BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, find,
 };
-use asid::core::{Parameter, Streams};
+use asid::core::{Explorer, Parameter, Problem, Result, Streams};
 use asid::pipeline::{self, Method};
 use asid::worlds::SimulatedWorld;
 use asid_comparison::method::Method as Named;
@@ -97,4 +103,61 @@ fn what_is_explored_for_information_beats_random_actions_and_these_beat_no_episo
             dr[i]
         );
     }
+}
+
+/// Plans for an initial state, and counts how often.
+struct Counting(Arc<AtomicU64>);
+
+impl Planner for Counting {
+    fn plan(&self, problem: &Problem<'_>, start: &[f64]) -> Result<(Vec<f64>, Vec<CurvePoint>)> {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        problem.physics_counter.fetch_add(7, Ordering::Relaxed);
+        let protocol = problem.task.exploration();
+        let numbers = protocol.horizon * protocol.action.len();
+        Ok((vec![start[0]; numbers], Vec::new()))
+    }
+}
+
+impl Explorer for Counting {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        Planned::explored(self, problem, start, String::new())
+    }
+}
+
+#[test]
+fn a_plan_is_made_once_for_a_problem_and_a_first_reading() {
+    let task = task_support::task("rod-balancing");
+    let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
+    task_support::on_engine(&*backend, &*task, &task.parameters(), 0, |problem, _| {
+        let plans = Plans::default();
+        let made = Arc::new(AtomicU64::new(0));
+        let width = problem.task.exploration().action.len();
+        // The first action, and the physics steps that are counted.
+        let play = |name: &str, x: f64| {
+            let reused = Reused {
+                explorer: Box::new(Counting(Arc::clone(&made))),
+                plans: &plans,
+                name: name.into(),
+            };
+            let mut reading = vec![0.0; 7];
+            (reading[0], reading[3]) = (x, 1.0);
+            let mut action = vec![f64::NAN; width];
+            let before = problem.physics_steps();
+            let mut policy = reused.explore(problem, None).unwrap().policy;
+            policy.act(0, &reading, &mut action).unwrap();
+            // The plan stays, whatever is read later.
+            policy.act(1, &[9.0; 7], &mut action).unwrap();
+            (action[0], problem.physics_steps() - before)
+        };
+        let first = play("a", 0.5);
+        assert_eq!(first.1, 7);
+        assert_eq!(play("a", 0.5), first, "the same plan at the same cost");
+        assert_ne!(play("a", 0.6).0, first.0, "another initial state");
+        play("b", 0.5);
+        assert_eq!(made.load(Ordering::Relaxed), 3);
+    });
 }

@@ -6,6 +6,7 @@
 #[allow(dead_code)] // not every test needs all of it
 mod cli_support;
 
+mod plugin_support;
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
@@ -132,14 +133,18 @@ fn a_task_is_tried_again_when_the_time_of_the_search_is_up() {
     assert_eq!(trials[0]["values"].as_array().unwrap().len(), 1);
 }
 
+/// The task is a plugin's, a pendulum: diagnoses of one joint take seconds.
 #[test]
 fn a_task_is_run_diagnosed_and_run_again() {
     let place = Workplace::new();
     let without = two_effects();
+    let libraries = plugin_support::build(&["payload-swing"]);
     let call = [
+        "--plugin",
+        libraries[0].to_str().unwrap(),
         "diagnose",
         "--task",
-        "shuffleboard",
+        "payload-swing",
         "--minutes",
         "60",
         "--runs",
@@ -149,7 +154,7 @@ fn a_task_is_run_diagnosed_and_run_again() {
         "--seeds",
         "1",
         "--real-effect",
-        "actuator-bias@joint1:bias=0.02",
+        "actuator-bias@motor:bias=0.5",
         "--set",
         "logs=exploration",
         "--set",
@@ -166,16 +171,16 @@ fn a_task_is_run_diagnosed_and_run_again() {
     assert!(output.status.success(), "{errors}");
     let result: Value = serde_json::from_str(&place.read("a/result.json")).unwrap();
     assert_eq!(
-        result["verdict"]["effects"][0], "actuator-bias@joint1",
+        result["verdict"]["effects"][0], "actuator-bias@motor",
         "{result:#}"
     );
     let world = &result["real_world"];
-    assert_eq!(world["effects"][0], "actuator-bias@joint1:bias=0.02");
+    assert_eq!(world["effects"][0], "actuator-bias@motor:bias=0.5");
     assert!(
         world["experiments"]
             .as_str()
             .unwrap()
-            .contains("actuator-bias@joint1")
+            .contains("actuator-bias@motor")
     );
     let trials = world["trials"].as_array().unwrap();
     let told: Vec<&str> = trials
@@ -213,7 +218,15 @@ fn a_task_is_run_diagnosed_and_run_again() {
     assert!(page.contains("The task, before and after"));
 
     // The folder's settings repeat the run.
-    let again = place.run(&["diagnose", "--config", "a/config.toml", "--out", "b"]);
+    let again = [
+        "diagnose",
+        "--trust-plugins",
+        "--config",
+        "a/config.toml",
+        "--out",
+        "b",
+    ];
+    let again = place.run(&again);
     assert!(
         again.status.success(),
         "{}",

@@ -6,6 +6,7 @@ pub mod fisher_cem;
 pub mod observation;
 pub mod open_loop;
 pub mod random;
+pub mod reused;
 
 pub use discriminating::{Discriminating, Rival};
 pub use environment::FisherEnvironment;

@@ -107,6 +107,10 @@ impl<P: Planner> Policy for Planned<'_, P> {
         Ok(())
     }
 
+    fn is_open_loop(&self) -> bool {
+        true
+    }
+
     fn take_curve(&mut self) -> Vec<CurvePoint> {
         std::mem::take(&mut self.curve)
     }

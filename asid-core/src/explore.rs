@@ -18,6 +18,11 @@ pub trait Policy: Send {
     /// When planning fails.
     fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()>;
 
+    /// Whether the first reading of an episode determines all of its actions.
+    fn is_open_loop(&self) -> bool {
+        false
+    }
+
     /// Return over the search, for a policy that searches at the start of its episode.
     fn take_curve(&mut self) -> Vec<CurvePoint> {
         Vec::new()

@@ -73,6 +73,23 @@ fn an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes_at_any_threads
     assert_eq!(times["cells"].as_array().unwrap().len(), 4);
 }
 
+/// Cells whose conditions set the hidden truth alone share the plan of their exploration. A cell
+/// that takes it over has the result and the cost of one that makes it.
+#[test]
+fn a_cell_that_shares_its_plan_is_the_cell_that_makes_it() {
+    let place = Workplace::new();
+    let of = |conditions: &[&str], out: &str| {
+        let conditions = conditions.iter().flat_map(|c| ["--condition", c]);
+        let common = ["--method", "asid", "--seeds", "1", "--threads", "1"];
+        let arguments: Vec<&str> = common.into_iter().chain(conditions).collect();
+        done(&place, &arguments, out);
+        place.read(&format!(
+            "{out}/cells/rod-balancing.right.asid.matched.rapier.0.json"
+        ))
+    };
+    assert_eq!(of(&["left", "right"], "shared"), of(&["right"], "alone"));
+}
+
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_a_comparison_with_the_way_to_go_on() {

@@ -4,9 +4,10 @@ use std::time::Instant;
 
 use crate::pipeline::{self, Method as Parts};
 use anyhow::Result;
+use asid_algorithms::explore::reused::{Plans, Reused};
 use asid_comparison::cell::{Cell, CellKey, CellParameter, SCHEMA, Versions};
-use asid_core::Model;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
+use asid_core::{Explorer, Model};
 
 use super::arm::Arm;
 use crate::cli::options::{Algorithms, Worlds};
@@ -34,18 +35,44 @@ pub fn open(arm: &Arm, key: &CellKey) -> Result<Session> {
     )
 }
 
-/// Runs a cell; returns it with the seconds that it took.
+/// Settings that no plan of exploration depends on. The real world does, but shows itself in the
+/// first reading alone.
+const AFTER_PLANNING: [&str; 5] = ["real", "identifier", "model_errors", "expected", "solver"];
+
+/// The explorer of a session, with the plans of other sessions.
+fn explorer<'p>(session: &Session, plans: &'p Plans) -> Result<Reused<'p>> {
+    let config = &session.config;
+    let explorer = &config.explorer;
+    let mut named = toml::Table::try_from(config)?;
+    for section in AFTER_PLANNING {
+        named.remove(section);
+    }
+    let condition = config.condition.as_deref();
+    let other_task = condition.map_or(Ok(None), |c| session.task.under(c))?;
+    if other_task.is_none() {
+        // The condition sets the hidden truth alone.
+        named.remove("condition");
+    }
+    Ok(Reused {
+        explorer: (find::<ExplorerEntry>(&explorer.name)?.make)(&explorer.settings)?,
+        plans,
+        name: named.to_string(),
+    })
+}
+
+/// Runs a cell; returns it with the seconds that it took. Open-loop plans of exploration are
+/// [shared](asid_algorithms::explore::reused) by the cells that would make the same.
 ///
 /// # Errors
 /// When it cannot be opened, or an algorithm or the world fails.
-pub fn run(arm: &Arm, key: &CellKey) -> Result<(Cell, f64)> {
+pub fn run(arm: &Arm, key: &CellKey, plans: &Plans) -> Result<(Cell, f64)> {
     let clock = Instant::now();
     let session = open(arm, key)?;
     let config = &session.config;
     let method = &arm.method;
     let explorer = method
         .explores()
-        .then(|| (find::<ExplorerEntry>(&config.explorer.name)?.make)(&config.explorer.settings))
+        .then(|| explorer(&session, plans))
         .transpose()?;
     let identifier = method
         .identifies()
@@ -63,7 +90,7 @@ pub fn run(arm: &Arm, key: &CellKey) -> Result<(Cell, f64)> {
     let problem = session.problem();
     let mut world = session.world(&truth)?;
     let parts = Parts {
-        explorer: explorer.as_deref(),
+        explorer: explorer.as_ref().map(|e| e as &dyn Explorer),
         identifier: identifier.as_deref(),
         solver: &*solver,
         ensemble: ensemble.as_ref().map(|e| e as &dyn Model),

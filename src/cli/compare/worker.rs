@@ -3,6 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
+use asid_algorithms::explore::reused::Plans;
 use asid_comparison::cell::{Cell, CellKey, Failure};
 use asid_comparison::schedule;
 use asid_comparison::store::Store;
@@ -30,6 +31,8 @@ pub struct Worker<'w> {
     arms: &'w Arms,
     /// All cells of the comparison.
     keys: &'w [CellKey],
+    /// Plans of exploration that cells share.
+    plans: Plans,
     progress: Progress,
     trouble: Mutex<Trouble>,
 }
@@ -47,6 +50,7 @@ impl<'w> Worker<'w> {
             store,
             arms,
             keys,
+            plans: Plans::default(),
             progress: Progress::new(quiet, pending),
             trouble: Mutex::default(),
         }
@@ -63,7 +67,7 @@ impl<'w> Worker<'w> {
             return Ok(None);
         }
         match self.arms.get(&name) {
-            Some(Ok(arm)) => cell::run(arm, key).map(Some),
+            Some(Ok(arm)) => cell::run(arm, key, &self.plans).map(Some),
             Some(Err(why)) => Err(Error::Missing {
                 what: format!("method `{}`", key.method),
                 message: why.clone(),
