@@ -36,8 +36,8 @@ pub struct FisherBatch<'a> {
     read: ReadingFrames,
     /// Control steps taken.
     at: usize,
-    /// Step actually taken by each pair of copies, prior-scaled: `episodes x entries`.
-    steps: Vec<f64>,
+    /// Steps up and down of each pair of copies, prior-scaled: `episodes x entries`.
+    steps: Vec<[f64; 2]>,
     information: Vec<Information>,
     ctrl: Vec<f64>,
     control: Vec<f64>,
@@ -106,7 +106,7 @@ impl<'a> FisherBatch<'a> {
             substeps: substeps(layout, protocol.frame_period)?,
             read: ReadingFrames::of(problem.task, protocol.frame_period),
             at: 0,
-            steps: vec![0.0; episodes * entries],
+            steps: vec![[0.0; 2]; episodes * entries],
             information: vec![Information::prior(d, nuisance); episodes],
             ctrl: vec![0.0; protocol.frames_per_step * layout.nu()],
             control: vec![0.0; n * protocol.frames_per_step * layout.nu()],
@@ -162,8 +162,8 @@ impl<'a> FisherBatch<'a> {
             all_theta.extend_from_slice(&t);
             all_starts.extend_from_slice(s);
             for entry in 0..self.entries {
-                let mut taken = 0.0;
-                for sign in [1.0, -1.0] {
+                let mut taken = [0.0; 2];
+                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                     let (mut t, mut s) = (t.clone(), s.to_vec());
                     if let Some(parameter) = self.problem.parameters.get(entry) {
                         let bound = Parameter::scaled_bound();
@@ -176,12 +176,12 @@ impl<'a> FisherBatch<'a> {
                             (z + sign * self.settings.delta).clamp(-bound, bound)
                         };
                         t[entry] = parameter.from_scaled(moved);
-                        taken += sign * moved;
+                        taken[side] = sign * (moved - z);
                     } else {
                         let i = entry - d;
                         let unit = self.problem.task.exploration().start[i].std();
                         s[i] += sign * START_DELTA * unit;
-                        taken += START_DELTA;
+                        taken[side] = START_DELTA;
                     }
                     all_theta.extend(t);
                     all_starts.extend(s);

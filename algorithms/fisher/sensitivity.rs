@@ -43,19 +43,25 @@ impl Sensitivity {
     /// The whitened Jacobian of a reading, column by column, one column per entry.
     ///
     /// `reading` returns the row of a copy: 0 is the episode itself, `1 + 2 i` has entry `i`
-    /// increased and `2 + 2 i` has it decreased. `steps` are the differences of the entries between
-    /// the two, prior-scaled.
-    pub fn jacobian<'r>(&mut self, reading: impl Fn(usize) -> &'r [f64], steps: &[f64]) -> &[f64] {
+    /// increased and `2 + 2 i` has it decreased. `steps` are the increase and the decrease of each
+    /// entry, prior-scaled. They differ where a range ends.
+    pub fn jacobian<'r>(
+        &mut self,
+        reading: impl Fn(usize) -> &'r [f64],
+        steps: &[[f64; 2]],
+    ) -> &[f64] {
         let rows = self.rows();
         self.noise.fill(1.0);
-        for (entry, step) in steps.iter().enumerate() {
+        for (entry, [above, below]) in steps.iter().enumerate() {
+            let step = above + below;
             let (up, down) = (reading(1 + 2 * entry), reading(2 + 2 * entry));
             self.signals.difference(up, down, &mut self.difference);
             for k in 0..rows {
                 self.jacobian[entry * rows + k] = self.difference[k] / step;
             }
             if self.rough[entry] {
-                // up + down - 2 middle: zero on a straight line, otherwise roughness and curvature.
+                // The middle's distance from the chord between the copies: zero on a straight
+                // line, otherwise roughness and curvature.
                 let middle = reading(0);
                 self.signals.difference(up, middle, &mut self.difference);
                 self.signals.difference(middle, down, &mut self.below);
@@ -64,7 +70,7 @@ impl Sensitivity {
                     .iter_mut()
                     .zip(self.difference.iter().zip(&self.below))
                 {
-                    *noise += (0.5 * (a - b)).powi(2);
+                    *noise += ((below * a - above * b) / step).powi(2);
                 }
             }
         }
@@ -72,5 +78,52 @@ impl Sensitivity {
             *j /= self.noise[i % rows].sqrt();
         }
         &self.jacobian
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Layout;
+    use asid_core::layout::Sensor;
+    use asid_core::signal::Signal;
+
+    /// Symptom: near an end of a prior's range the expected deviation was up to four times too
+    /// large. Cause: the copies of an episode are then at unequal distances, and the slope was
+    /// taken for roughness.
+    #[test]
+    fn a_straight_line_is_not_rough_where_its_range_ends() {
+        let layout = Layout {
+            timestep: 0.01,
+            nq: 0,
+            nv: 0,
+            bodies: Vec::new(),
+            geoms: Vec::new(),
+            joints: Vec::new(),
+            actuators: Vec::new(),
+            sensors: vec![Sensor {
+                name: "x".into(),
+                kind: "jointpos".into(),
+                address: 0,
+                len: 1,
+            }],
+            keyframes: Vec::new(),
+        };
+        let signal = Signal {
+            sensor: "x".into(),
+            noise: 0.1,
+        };
+        let signals = SignalSet::new(&layout, &[signal]).unwrap();
+        let mut sensitivity = Sensitivity::new(signals, vec![true]);
+        // The reading is 3 times the entry: a slope of 30 in units of the noise.
+        for [above, below] in [[0.3, 0.3], [0.1, 0.3], [0.0, 0.3]] {
+            let readings = [[0.0], [3.0 * above], [-3.0 * below]];
+            let slope = sensitivity.jacobian(|i| &readings[i], &[[above, below]]);
+            assert!((slope[0] - 30.0).abs() < 1e-9, "{slope:?}");
+        }
+        // A deviation of one noise from a straight line counts as as much noise again.
+        let readings = [[0.1], [0.3], [-0.3]];
+        let slope = sensitivity.jacobian(|i| &readings[i], &[[0.1, 0.1]]);
+        assert!((slope[0] - 30.0 / 2.0_f64.sqrt()).abs() < 1e-9, "{slope:?}");
     }
 }

@@ -209,13 +209,20 @@ struct Seen {
 
 impl Seen {
     fn new(fit: &Fit, sought: usize) -> Self {
-        let eigen = fit.about(sought).symmetric_eigen();
         let see = |v: &f64| if *v < UNSEEN { 0.0 } else { *v };
+        // Where every unknown is binary there is no direction.
+        let (information, directions) = if sought == 0 {
+            (Vec::new(), DMatrix::zeros(0, 0))
+        } else {
+            let eigen = fit.about(sought).symmetric_eigen();
+            let seen = eigen.eigenvalues.iter().map(see).collect();
+            (seen, eigen.eigenvectors)
+        };
         Self {
             middle: DVector::from_column_slice(&fit.free[..sought]),
             at: fit.point[..sought].to_vec(),
-            information: eigen.eigenvalues.iter().map(see).collect(),
-            directions: eigen.eigenvectors,
+            information,
+            directions,
         }
     }
 
