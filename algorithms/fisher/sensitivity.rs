@@ -94,20 +94,13 @@ mod tests {
     #[test]
     fn a_straight_line_is_not_rough_where_its_range_ends() {
         let layout = Layout {
-            timestep: 0.01,
-            nq: 0,
-            nv: 0,
-            bodies: Vec::new(),
-            geoms: Vec::new(),
-            joints: Vec::new(),
-            actuators: Vec::new(),
             sensors: vec![Sensor {
                 name: "x".into(),
                 kind: "jointpos".into(),
                 address: 0,
                 len: 1,
             }],
-            keyframes: Vec::new(),
+            ..Layout::default()
         };
         let signal = Signal {
             sensor: "x".into(),

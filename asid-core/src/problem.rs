@@ -177,14 +177,7 @@ mod tests {
     fn a_frame_that_no_steps_fill_names_the_models_option() {
         let layout = Layout {
             timestep: 0.01,
-            nq: 0,
-            nv: 0,
-            bodies: Vec::new(),
-            geoms: Vec::new(),
-            joints: Vec::new(),
-            actuators: Vec::new(),
-            sensors: Vec::new(),
-            keyframes: Vec::new(),
+            ..Layout::default()
         };
         assert_eq!(substeps(&layout, 0.05).unwrap(), 5);
         let error = substeps(&layout, 0.015).unwrap_err().to_string();

@@ -125,7 +125,7 @@ impl ModelHandle {
         let mut handle = Self {
             engine: engine.clone(),
             pointer,
-            layout: empty_layout(),
+            layout: Layout::default(),
             world: host.world.into_inner().and_then(Result::ok),
         };
         handle.layout = match handle.own_layout()? {
@@ -211,18 +211,4 @@ pub fn about(code: Code, engine: &Checked, asked: &str) -> String {
     }
     // SAFETY: checked when the table was.
     unsafe { text::read(engine.table.name, "name") }.unwrap_or_default()
-}
-
-fn empty_layout() -> Layout {
-    Layout {
-        timestep: 0.0,
-        nq: 0,
-        nv: 0,
-        bodies: Vec::new(),
-        geoms: Vec::new(),
-        joints: Vec::new(),
-        actuators: Vec::new(),
-        sensors: Vec::new(),
-        keyframes: Vec::new(),
-    }
 }
