@@ -100,6 +100,10 @@ impl Policy for Across<Box<dyn Policy + '_>> {
             .finite(reading, action, "an action of the policy")
     }
 
+    fn is_open_loop(&self) -> bool {
+        self.run(|policy| policy.is_open_loop())
+    }
+
     fn take_curve(&mut self) -> Vec<CurvePoint> {
         self.run_mut(|policy| policy.take_curve())
     }
