@@ -78,6 +78,8 @@ pub struct Shown {
     pub laws: usize,
     /// Whether it names no effect because tolerances make up for a gap.
     pub within_tolerances: bool,
+    /// Probability that there is a gap, which must have a cause; 0 where tolerances may explain it.
+    pub caused: f64,
 }
 
 /// Probabilities beyond which evidence carries no more information.
@@ -177,7 +179,6 @@ impl Confidence {
     pub fn settle(&self, judgement: &mut Judgement, shown: Shown, untried: &[Untried]) {
         let best = judgement.best_explanation().clone();
         let is_none = best.labels.is_empty() && !judgement.is_unknown;
-        let is_named = !is_none && !judgement.is_unknown;
         if is_none && !shown.within_tolerances {
             return;
         }
@@ -196,6 +197,10 @@ impl Confidence {
             probability: best.probability * u.weight,
             ..Hypothesis::default()
         }));
+        if judgement.is_unknown {
+            self.settle_unknown(judgement, shown.caused);
+            return;
+        }
         let is_alike: Vec<bool> = (0..judgement.hypotheses.len())
             .map(|i| judgement.ambiguous.contains(&i))
             .collect();
@@ -217,21 +222,15 @@ impl Confidence {
         // The remaining gap is an input of its own, `Shown::left`.
         let raw = marginal / (1.0 - judgement.unknown).max(f64::MIN_POSITIVE);
         let first = with + alike;
-        let [p, rivals, unknown] = if is_named || is_none {
-            let (p, less) = if is_named {
-                let claim = claim(raw, shown);
-                judgement.claim = Some(claim);
-                let p = sigmoid(self.log_odds(&claim));
-                (p, !shown.stopped && shown.laws < 2)
-            } else {
-                (self.ordinary.min(best.probability), true)
-            };
-            self.shares((p, less), p * with / first * others)
+        let (p, less) = if is_none {
+            (self.ordinary.min(best.probability), true)
         } else {
-            let unknown = judgement.unknown.min(self.unknown);
-            let each = (1.0 - unknown) / (first + others);
-            [each * first, each * others, unknown]
+            let claim = claim(raw, shown);
+            judgement.claim = Some(claim);
+            let p = sigmoid(self.log_odds(&claim));
+            (p, !shown.stopped && shown.laws < 2)
         };
+        let [p, rivals, unknown] = self.shares((p, less), p * with / first * others);
         for (h, alike) in judgement.hypotheses.iter_mut().zip(is_alike) {
             let share = if alike || holds(h) {
                 p / first
@@ -241,6 +240,35 @@ impl Confidence {
             h.probability = share * weight(h);
         }
         judgement.unknown = unknown;
+        judgement.sort();
+    }
+
+    /// Gives the hypotheses of a judgement that is `unknown` their calibrated probabilities.
+    ///
+    /// No effect has at most the probability that there is no gap. The sets of effects share the
+    /// rest in proportion to their likelihoods; without any it goes to `unknown`.
+    fn settle_unknown(&self, judgement: &mut Judgement, caused: f64) {
+        let unknown = judgement.unknown.min(self.unknown);
+        let all = judgement.hypotheses.iter();
+        let (none, named): (Vec<_>, Vec<_>) = all.partition(|h| h.labels.is_empty());
+        let sum = |of: &[&Hypothesis]| of.iter().map(|h| h.probability).sum::<f64>();
+        let (of_none, of_named) = (sum(&none), sum(&named));
+        let whole = (of_none + of_named).max(f64::MIN_POSITIVE);
+        let none = ((1.0 - unknown) * of_none / whole).min(1.0 - caused);
+        let named = if of_named > 0.0 {
+            1.0 - unknown - none
+        } else {
+            0.0
+        };
+        for h in &mut judgement.hypotheses {
+            let (share, of) = if h.labels.is_empty() {
+                (none, of_none)
+            } else {
+                (named, of_named)
+            };
+            h.probability *= share / of.max(f64::MIN_POSITIVE);
+        }
+        judgement.unknown = 1.0 - none - named;
         judgement.sort();
     }
 }
@@ -272,6 +300,7 @@ mod tests {
             stopped,
             laws: 1,
             within_tolerances: false,
+            caused: 1.0,
         }
     }
 
@@ -366,7 +395,29 @@ mod tests {
         assert!((sum(&j) - 1.0).abs() < 1e-12);
         let mut j = judgement(&[(&[], 0.0), (&["a"], 0.001)], 1, 0.999);
         Confidence::default().settle(&mut j, shown(0.8, true), &[]);
-        assert_eq!(j.unknown, 0.55);
+        assert!((j.unknown - 0.55).abs() < 1e-12);
         assert!((sum(&j) - 1.0).abs() < 1e-12);
+    }
+
+    /// Symptom: beside `unknown`, `none` had 40 % however large the gap. Cause: no effect took all
+    /// that `unknown` left, as if there were no gap.
+    #[test]
+    fn no_effect_is_no_more_probable_than_no_gap() {
+        let gap = Shown {
+            caused: 0.99,
+            ..shown(1.0, false)
+        };
+        let settled = |sets: &[(&[&str], f64)]| {
+            let mut j = judgement(sets, 0, 0.99);
+            Confidence::default().settle(&mut j, gap, &[]);
+            assert!((sum(&j) - 1.0).abs() < 1e-12);
+            let none = j.hypotheses.iter().find(|h| h.labels.is_empty());
+            (none.unwrap().probability, j.unknown)
+        };
+        let (none, unknown) = settled(&[(&[], 0.01)]);
+        assert!(none < 0.011 && unknown > 0.98, "{none} {unknown}");
+        let (none, unknown) = settled(&[(&[], 0.0095), (&["a"], 0.0005)]);
+        assert!(none < 0.011, "{none}");
+        assert!((unknown - 0.55).abs() < 1e-12, "{unknown}");
     }
 }

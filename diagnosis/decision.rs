@@ -128,6 +128,22 @@ fn is_ordinary(evidence: &Evidence, set: usize) -> bool {
 /// Share of a gap from which on it is the larger part of it.
 const LARGER_PART: f64 = 0.5;
 
+/// Mean square of a replay, relative to that of the readings about their own mean, from which on it
+/// counts as diverged: it is a hundred times as far from the readings as a constant is.
+const DIVERGED: f64 = 1e4;
+
+/// Returns the mean square that a set is to reduce: that without effects, or that of the readings
+/// about their own mean where the replay without effects diverged.
+///
+/// Any replay that stays finite would close a gap without end.
+fn to_close(none: f64, mean: f64) -> f64 {
+    if mean > 1.0 && none > DIVERGED * mean {
+        mean
+    } else {
+        none
+    }
+}
+
 /// Returns the share of the gap that a set leaves, 0 to 1.
 ///
 /// It is the share of the missing force or of the open-loop gap, whichever is less: what is named
@@ -136,8 +152,8 @@ const LARGER_PART: f64 = 0.5;
 /// larger part; what tolerances leave counts in any case.
 fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     let share = |i: usize, of: fn(Replayed) -> f64| {
-        let beyond = |r: Replayed| excess(of(r)).powi(2);
-        beyond(evidence.tried[i].replayed) / beyond(evidence.none)
+        let whole = to_close(of(evidence.none), of(evidence.mean));
+        excess(of(evidence.tried[i].replayed)).powi(2) / excess(whole).powi(2)
     };
     let open_loop = found.map_or(1.0, |i| share(i, |r| r.train));
     let left = evidence.left.min(open_loop).clamp(0.0, 1.0);
@@ -171,6 +187,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let unknown = sets.unknown((least, best), seen, rest);
     let ambiguous = sets.ambiguous(best);
     let within_tolerances = best == least && sets.ordinary.is_some();
+    let caused = if sets.ordinary.is_some() { 0.0 } else { seen };
     let mut judgement = Judgement::of(sets.all, (best, ambiguous), (unknown, rest));
     let found = judgement.best_explanation().found;
     let found = found.map(|i| &evidence.tried[i]);
@@ -181,6 +198,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         stopped: evidence.stopped,
         laws: found.map_or(0, |t| grouped(&t.effects).len()),
         within_tolerances,
+        caused,
     };
     let untried = untried(evidence, found, rules);
     rules.confidence.settle(&mut judgement, shown, &untried);

@@ -7,7 +7,7 @@ mod cli_support;
 
 use std::process::Output;
 
-use cli_support::{Workplace, tiny};
+use cli_support::{ENGINE, Workplace, tiny};
 use serde_json::Value;
 
 fn figure(place: &Workplace, name: &str, arguments: &[&str], out: &str) -> Output {
@@ -99,7 +99,7 @@ fn a_curve_of_difficulty_goes_on_with_the_levels_that_are_there() {
     let kept = "b/levels/ledge_width=0.06";
     std::fs::create_dir_all(place.path("b/levels")).unwrap();
     std::fs::rename(place.path("a/levels/ledge_width=0.06"), place.path(kept)).unwrap();
-    let cell = format!("{kept}/cells/rod-balancing.left.dr.matched.rapier.0.json");
+    let cell = format!("{kept}/cells/rod-balancing.left.dr.matched.{ENGINE}.0.json");
     let before = std::fs::metadata(place.path(&cell))
         .unwrap()
         .modified()

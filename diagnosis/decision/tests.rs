@@ -57,6 +57,19 @@ fn what_closes_the_gap_is_named_and_trusted() {
     assert!(!found.is_unknown && found.marginal(&["a".to_owned()]) > 0.8);
 }
 
+/// Symptom: where the model as given diverged, any set whose replays stay finite closed the whole
+/// gap. Cause: a share of a gap without end is zero.
+#[test]
+fn what_keeps_a_diverging_model_finite_is_judged_against_the_readings_own_mean() {
+    // Half of the readings' own variance, 1e4, is left.
+    let half = |none: f64| {
+        let set = tried(&["a"], 1, 300.0, 5e3);
+        decided(&evidence(none, vec![set], 0.01))
+    };
+    assert!((half(1e12).rest - 0.5).abs() < 1e-3, "{}", half(1e12).rest);
+    assert!((half(1e5).rest - 0.05).abs() < 1e-3, "{}", half(1e5).rest);
+}
+
 /// Symptom: friction at two joints was named with a probability of 0.68 if the search had found
 /// one joint after the other, and of 0.92 if it had found both at once. Cause: the names of a
 /// set were counted as its laws.

@@ -20,6 +20,7 @@ use nalgebra::DMatrix;
 use super::context::Context;
 use super::estimate::Estimate;
 use super::fitted_value::Unknown;
+use super::half_step::HalfStep;
 use super::scales::settled;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
@@ -127,6 +128,7 @@ pub fn fit<'p>(
     let m = free.len();
     let nx = 2 * context.plant().layout.nv;
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + m + 1)?;
+    let mut finer = HalfStep::of(context, hypothesis)?;
     let steps = context.start_steps();
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
@@ -143,7 +145,10 @@ pub fn fit<'p>(
             &estimate,
             &variations,
         )?;
-        context.step_error.join(&mut linear, m);
+        if let Some(finer) = &mut finer {
+            let error = finer.error(&theta, &estimate.trajectory, &linear)?;
+            error.join(&mut linear, m);
+        }
         let model = (&unknowns[..], &free[..], &theta[..]);
         let whole = round == 0 || has_segments;
         if round == 0 && extent.settles {

@@ -24,7 +24,7 @@ use crate::work::Work;
 use super::context::Context;
 use super::fit::{Fitted, Hypothesis, fit};
 use super::fitted_value::Unknown;
-use super::half_step::step_error;
+use super::half_step::Finer;
 use super::left::left;
 use super::picture::forces;
 use super::search::{OpenLoop, Outcome, Set, search};
@@ -202,11 +202,8 @@ fn searched_in(
 fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
     let (context, none) = (&mut stands.context, &mut stands.none);
     let (bench, hypothesis) = (null.bench, null.hypothesis);
-    if context.walks.iter().any(|w| w.segment.is_none())
-        && let Ok(finer) = bench.machine.halved()
-    {
-        let (model, states) = ((hypothesis, &none.theta[..]), &none.estimate.trajectory);
-        context.step_error = step_error(context, model, states, &finer)?;
+    if context.walks.iter().any(|w| w.segment.is_none()) {
+        context.finer = Finer::of(&bench.machine, &context.walks);
     }
     let shares = none.estimate.missing(context).share < 1.0;
     if shares {
@@ -214,7 +211,7 @@ fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
         none.estimate.free_at_start(context);
         none.estimate.set_resolution(context);
     }
-    if shares || context.step_error.columns() > 0 {
+    if shares || context.finer.is_some() {
         let from = (&none.estimate, &none.slopes);
         let rounds = (ROUNDS, null.progress);
         return fit(context, hypothesis, &none.theta, from, rounds);

@@ -12,7 +12,7 @@ mod resumed;
 use std::path::Path;
 use std::process::Output;
 
-use cli_support::{Workplace, tiny};
+use cli_support::{ENGINE, Workplace, tiny};
 use serde_json::Value;
 
 /// Files that do not depend on how a comparison was run.
@@ -126,7 +126,7 @@ fn a_deviation_is_expected_of_a_run_only_where_it_was_fitted() {
         let output = place.run(&[&fits[..], &SMALL, &own].concat());
         assert!(output.status.success(), "{}", said(&output));
         let cell = place.read(&format!(
-            "{out}/cells/rod-balancing.left.random.matched.rapier.0.json"
+            "{out}/cells/rod-balancing.left.random.matched.{ENGINE}.0.json"
         ));
         let cell: Value = serde_json::from_str(&cell).unwrap();
         let expected = &cell["parameters"][0]["expected_std"];

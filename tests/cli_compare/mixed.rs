@@ -1,6 +1,6 @@
 //! What does not belong together is neither merged nor mixed in a folder.
 
-use crate::cli_support::{Workplace, tiny};
+use crate::cli_support::{ENGINE, Workplace, tiny};
 use serde_json::Value;
 
 use super::{compare, done, result, said};
@@ -82,7 +82,7 @@ fn comparisons_merge_only_where_they_belong_together() {
         ("\"engine\": \"", "was made on"),
         ("\"settings\": \"", "other settings of dr"),
     ] {
-        let cell = "a/cells/rod-balancing.left.dr.matched.rapier.0.json";
+        let cell = &format!("a/cells/rod-balancing.left.dr.matched.{ENGINE}.0.json");
         let text = place.read(cell);
         let other = format!("x-{}", change.trim_matches(['"', ':', ' ']));
         std::fs::create_dir_all(place.path(&format!("{other}/cells"))).unwrap();

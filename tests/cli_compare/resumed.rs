@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::cli_support::{Workplace, tiny};
+use crate::cli_support::{ENGINE, Workplace, tiny};
 use serde_json::Value;
 
 use super::{SAME, compare, copy_folder, done, result, said};
@@ -47,7 +47,8 @@ fn an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes_at_any_threads
         .asid(&tiny(&[&common[..], &PAIR, &["--out", "a"]].concat()))
         .spawn()
         .unwrap();
-    let first = place.path("a/cells/rod-balancing.left.random.matched.rapier.0.json");
+    let first = format!("a/cells/rod-balancing.left.random.matched.{ENGINE}.0.json");
+    let first = place.path(&first);
     while !first.exists() {
         assert!(
             child.try_wait().unwrap().is_none(),
@@ -84,7 +85,7 @@ fn a_cell_that_shares_its_plan_is_the_cell_that_makes_it() {
         let arguments: Vec<&str> = common.into_iter().chain(conditions).collect();
         done(&place, &arguments, out);
         place.read(&format!(
-            "{out}/cells/rod-balancing.right.asid.matched.rapier.0.json"
+            "{out}/cells/rod-balancing.right.asid.matched.{ENGINE}.0.json"
         ))
     };
     assert_eq!(of(&["left", "right"], "shared"), of(&["right"], "alone"));

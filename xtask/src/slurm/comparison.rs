@@ -20,7 +20,7 @@ const SAME: [&str; 5] = [
 ];
 
 /// A comparison with very short runs; its figures mean nothing.
-const TINY: &str = "compare rod-balancing --backend rapier --method random --method dr \
+const TINY: &str = "compare rod-balancing --backend mujoco --method random --method dr \
     --condition left --seeds 3 --set identifier.iterations=1 --set identifier.population=8 \
     --set identifier.sampling.rounds=1 --set identifier.sampling.draws=8 --set solver.iterations=1 \
     --set solver.population=2 --set solver.belief_samples=1";
@@ -30,7 +30,7 @@ const BRIEF: &[&str] = &["--set", "expected.rounds=1"];
 
 /// Settings that make a task of the array outlast the half minute after which Slurm checks time
 /// limits.
-const LONG: &[&str] = &["--set", "expected.rounds=7"];
+const LONG: &[&str] = &["--set", "expected.rounds=28"];
 
 /// Number of runs of [`TINY`].
 const RUNS: usize = 6;
