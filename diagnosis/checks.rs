@@ -3,6 +3,7 @@
 mod identifiability;
 mod missing;
 mod missing_force;
+mod motion;
 mod units;
 
 use asid_core::Result;
@@ -18,6 +19,7 @@ use crate::result::CheckResult;
 
 pub use identifiability::identifiability;
 pub use missing_force::{missing_force, windows};
+pub use motion::motion;
 pub use units::units;
 
 /// Largest share of missing readings that passes the check.

@@ -6,6 +6,7 @@ mod estimated_short;
 mod open_loop;
 mod share_left;
 mod unchanging;
+mod wiring_check;
 
 use asid_core::Result;
 use asid_logs::episode::ColumnMapping;
@@ -14,12 +15,13 @@ use crate::machine::Machine;
 use crate::outliers::{self, LeftOut};
 use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
-use crate::wiring::{self, Settings};
+use crate::wiring::{self, OfSomeLogs, Settings};
 
 pub use absent::{Absent, absent};
 pub use estimated_short::Short;
 use share_left::share_left;
 pub use unchanging::{Unchanging, pass_over};
+use wiring_check::{in_words, of_some_logs};
 
 /// Share of the residual power up to which corrected wiring is the more probable cause.
 ///
@@ -49,6 +51,8 @@ pub struct Intake {
     ///
     /// Readings must be interpolated only once: each interpolation correlates their noise further.
     before: Option<Study>,
+    /// Fault of some logs alone, which are left out as far as others remain.
+    apart: Option<OfSomeLogs>,
     left_out: Vec<LeftOut>,
     /// Sensors that some logs read and others do not.
     absent: Vec<Absent>,
@@ -78,6 +82,7 @@ impl Intake {
             wiring: Vec::new(),
             mappings: Vec::new(),
             before: None,
+            apart: None,
             left_out,
             absent,
             unchanging,
@@ -93,7 +98,18 @@ impl Intake {
         if intake.study.wired {
             return Ok(intake);
         }
-        let mended = wiring::mend(&intake.study, machine, &Settings::default())?;
+        let mut mended = wiring::mend(&intake.study, machine, &Settings::default())?;
+        intake.apart = mended.apart.take();
+        if let Some(apart) = &intake.apart {
+            let names = &apart.logs;
+            for study in [&mut intake.study, &mut mended.study] {
+                for logs in [&mut study.train, &mut study.test] {
+                    if logs.iter().any(|(name, _)| !names.contains(name)) {
+                        logs.retain(|(name, _)| !names.contains(name));
+                    }
+                }
+            }
+        }
         if mended.wiring.is_empty() {
             return Ok(intake);
         }
@@ -148,6 +164,9 @@ impl Intake {
         ];
         result.checks.splice(at..at, told.into_iter().flatten());
         result.wiring.clone_from(&self.wiring);
+        if let Some(apart) = &self.apart {
+            result.sentence = format!("Wiring: {}. {}", of_some_logs(apart), result.sentence);
+        }
         if !self.wiring.is_empty() {
             let each: Vec<String> = self.wiring.iter().map(in_words).collect();
             result.sentence = format!(
@@ -212,44 +231,4 @@ impl Intake {
             ),
         })
     }
-
-    fn wiring_check(&self) -> Option<CheckResult> {
-        if self.study.wired {
-            return None;
-        }
-        let each: Vec<String> = self.wiring.iter().map(in_words).collect();
-        Some(CheckResult {
-            check: "wiring".into(),
-            ok: each.is_empty(),
-            detail: if each.is_empty() {
-                "columns mean what their names say".into()
-            } else {
-                format!(
-                    "{}: put into the study file {}",
-                    each.join("; "),
-                    self.wiring
-                        .iter()
-                        .filter(|w| !w.mend.is_empty())
-                        .map(|w| w.mend.replace('\n', " "))
-                        .collect::<Vec<_>>()
-                        .join(" ")
-                )
-            },
-        })
-    }
-}
-
-/// Describes a wiring fault in words.
-fn in_words(wiring: &WiringResult) -> String {
-    let columns: Vec<String> = wiring.columns.iter().map(|c| format!("`{c}`")).collect();
-    let columns = columns.join(" and ");
-    let what = match &*wiring.fault {
-        "wiring-swapped" => "are swapped",
-        "wiring-sign" => "counts the other way",
-        "wiring-unit" => "is in another unit",
-        ZERO => "has another zero",
-        CLOCK => "are late or early against the commands",
-        _ => "are wired otherwise",
-    };
-    format!("{columns} {what} (probability {:.2})", wiring.probability)
 }

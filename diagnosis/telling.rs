@@ -251,6 +251,7 @@ impl Telling<'_> {
             checks::data(&bench.train.logs, &bench.test.logs, bench.open.len()),
             checks::units(bench, self.nominal)?,
         ];
+        all.extend(checks::motion(&bench.train.logs));
         all.extend(checks::memory(&bench.machine));
         all.extend(checks::identifiability(&bench.parameters, none, best));
         let repeats = self.findings.repeats;

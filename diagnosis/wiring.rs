@@ -13,8 +13,10 @@ pub mod mend;
 pub mod record;
 pub mod search;
 mod size;
+mod some_logs;
 pub mod view;
 pub mod windows;
 
 pub use evidence::Settings;
 pub use mend::{Mended, mend};
+pub use some_logs::OfSomeLogs;

@@ -14,6 +14,7 @@ use super::evidence::Settings;
 use super::hypotheses::{Fault, LATEST, Quantity, quantities, view_of};
 use super::record::Recorded;
 use super::search::{Found, Outcome, Search};
+use super::some_logs::{OfSomeLogs, of_some_logs};
 use super::view::{View, mapping};
 use super::windows::{FEW, WINDOWS, Windows};
 
@@ -32,6 +33,8 @@ pub struct Mended {
     pub shrinkage: Vec<f64>,
     /// The most likely fault that is not named.
     pub nearest: Option<Nearest>,
+    /// Fault of some logs alone, which is not corrected.
+    pub apart: Option<OfSomeLogs>,
 }
 
 /// A fault that is not named.
@@ -73,6 +76,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         doubted: false,
         shrinkage: Vec::new(),
         nearest: None,
+        apart: None,
     };
     let layout = &machine.plant.layout;
     let sensors = logged(study, machine);
@@ -107,9 +111,11 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         columns: n.quantities.iter().map(|&q| all[q].name.clone()).collect(),
         shrinkage: n.shrinkage,
     });
+    let apart = of_some_logs(study, machine, (&sensors, &all), (&view, settings))?;
     if found.is_empty() {
         return Ok(Mended {
             nearest,
+            apart,
             ..unchanged()
         });
     }
@@ -137,6 +143,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         doubted: found.iter().all(in_doubt),
         shrinkage: found.iter().map(|f| f.shrinkage).collect(),
         nearest,
+        apart,
     })
 }
 

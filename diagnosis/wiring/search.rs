@@ -2,6 +2,7 @@
 //!
 //! Hypotheses are evaluated on a few windows first, and the leading ones on all.
 
+mod apart;
 mod clock;
 mod offset;
 mod refusal;
@@ -13,6 +14,8 @@ use super::hypotheses::{self, Fault, Hypothesis, Quantity};
 use super::record::Recorded;
 use super::view::View;
 use super::windows::{Misses, Windows};
+
+pub use apart::Apart;
 
 /// Largest number of faults that are searched for in turn: a log with more needs its owner's
 /// attention.

@@ -117,6 +117,45 @@ fn a_column_that_drifts_away_is_in_no_other_unit() {
     }
 }
 
+/// Symptom: one log of several that counts a joint the other way, or reads it in degrees, made the
+/// answer `unknown` while the check of the wiring passed. Cause: what the columns mean was asked of
+/// all logs together.
+#[test]
+fn a_log_that_is_wired_in_its_own_way_is_named_and_left_out() {
+    let right = study(true);
+    let turned = |m: ColumnMapping| spoilt(&right, &[m]);
+    let other_way = turned(ColumnMapping {
+        sign: -1.0,
+        ..of("q_elbow")
+    });
+    let degrees = turned(ColumnMapping {
+        scale: 180.0 / std::f64::consts::PI,
+        ..of("q_shoulder")
+    });
+    for (fault, column, spoilt) in [
+        ("wiring-sign", "q_elbow", other_way),
+        ("wiring-unit", "q_shoulder", degrees),
+    ] {
+        let mut study = right.clone();
+        study.train[1].1 = spoilt.train[1].1.clone();
+        let intake = Intake::of(&study, &machine(&study)).unwrap();
+        let names = |s: &Study| -> Vec<String> { s.train.iter().map(|l| l.0.clone()).collect() };
+        let mut left = names(&right);
+        let odd = left.remove(1);
+        assert_eq!(names(&intake.study), left, "{fault}");
+        let mut result = DiagnosisResult::default();
+        intake.tell(&mut result, CheckResult::default());
+        let check = result.checks.iter().find(|c| c.check == "wiring").unwrap();
+        assert!(!check.ok && result.wiring.is_empty());
+        for part in [&*odd, column, "alone"] {
+            assert!(check.detail.contains(part), "{part}: {}", check.detail);
+            assert!(result.sentence.contains(part), "{}", result.sentence);
+        }
+    }
+    let of_right = mended(&right);
+    assert!(of_right.apart.is_none(), "{:?}", of_right.apart);
+}
+
 #[test]
 fn wiring_sign() {
     let turned = ColumnMapping {

@@ -9,9 +9,16 @@ use crate::lint::stages_of_lint;
 use crate::stage::{SHARED, Stages};
 use crate::{binaries, deny, library, miri, python, setup, slurm};
 
-/// Tests of the command line that call every stage of the pipeline, and of what the pure build
-/// refuses.
-const PURE: [&str; 2] = ["--test=cli_run", "--test=cli_refusals"];
+/// Tests of the pure build: every stage of the pipeline by the command line, and what such a build
+/// refuses. The other tests have run with all features.
+const PURE: [&str; 6] = [
+    "--test=cli_run",
+    "--test=cli_refusals",
+    "--",
+    "the_stages_lead_from_one_to_the_next",
+    "left_out",
+    "needs_torch",
+];
 
 /// Runs all stages; without the native libraries the other stages cannot be built.
 pub fn run() -> Result<bool> {

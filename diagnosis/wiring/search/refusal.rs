@@ -34,7 +34,12 @@ impl Search<'_> {
     ///
     /// With a unit that is far too large everything moves straight on, so the column says nothing
     /// against the model, and nothing for it.
-    fn is_nonsense(&self, view: &View, hypothesis: &Hypothesis, misses: &Misses) -> bool {
+    pub(super) fn is_nonsense(
+        &self,
+        view: &View,
+        hypothesis: &Hypothesis,
+        misses: &Misses,
+    ) -> bool {
         let missed = Settings::missed(misses, self.settings.nonsense);
         let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
         let size = |view: &View, q: &Quantity| view_of(view, q).factor.abs();
