@@ -72,7 +72,7 @@ pub struct Training {
     pub alone: bool,
 }
 
-/// Says how much of the gap is closed, with its interval.
+/// Says how much of the gap is closed, with its interval if there is one.
 fn part_closed(result: &DiagnosisResult, training: Training) -> String {
     if training.alone {
         let Training { none, best, .. } = training;
@@ -87,6 +87,7 @@ fn part_closed(result: &DiagnosisResult, training: Training) -> String {
             100.0 * low,
             100.0 * high
         ),
+        (Some(c), None) => format!("{} of it", percent(c)),
         _ => "what there is of it".into(),
     }
 }

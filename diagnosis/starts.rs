@@ -4,9 +4,9 @@
 pub(crate) mod reach;
 
 use asid_core::Layout;
-use asid_core::layout::JointKind;
+use asid_core::layout::{JointKind, Sensor};
 use asid_core::problem::home;
-use asid_core::signal::{rotation_difference, unit_quaternion};
+use asid_core::signal::{orientation, rotation_difference, unit_quaternion};
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 
@@ -20,20 +20,20 @@ pub fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
     let (mut qpos, mut qvel) = home(layout);
     first_readings(plant, episode, &mut qpos, &mut qvel);
     if let Some(initial) = &episode.initial {
+        let read = qpos.clone();
         for (x, given) in qpos.iter_mut().zip(&initial.qpos) {
             if given.is_finite() {
                 *x = *given;
             }
         }
-        // A mixture of given and read components is not a unit quaternion yet.
-        for joint in &layout.joints {
-            let first = match joint.kind {
-                JointKind::Free => joint.qpos + 3,
-                JointKind::Ball => joint.qpos,
-                JointKind::Hinge | JointKind::Slide => continue,
-            };
-            let turn = unit_quaternion(&qpos[first..first + 4]);
-            qpos[first..first + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+        // A mixture of given and read components is not a unit quaternion yet. One that is no
+        // orientation gives none.
+        for first in layout.quaternions() {
+            let own = first..first + 4;
+            match orientation(&qpos[own.clone()]) {
+                Some(turn) => qpos[own].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]),
+                None => qpos[own.clone()].copy_from_slice(&read[own]),
+            }
         }
         for (x, given) in qvel.iter_mut().zip(&initial.qvel) {
             if given.is_finite() {
@@ -51,12 +51,12 @@ const FIRST_ROWS: usize = 6;
 fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64], qvel: &mut [f64]) {
     let layout = &plant.layout;
     // The first row with a reading of a sensor and one a little later, with the time between.
-    let seen = |sensor: &str| -> Option<(Vec<f64>, Vec<f64>, f64)> {
-        let range = episode.channel(sensor)?;
+    let seen = |sensor: &Sensor| -> Option<(Vec<f64>, Vec<f64>, f64)> {
+        let range = episode.channel(&sensor.name)?;
         let whole = |k: &usize| {
-            episode.reading(*k)[range.clone()]
-                .iter()
-                .all(|x| x.is_finite())
+            let reading = &episode.reading(*k)[range.clone()];
+            let is_read = reading.iter().all(|x| x.is_finite());
+            is_read && (!sensor.is_orientation() || orientation(reading).is_some())
         };
         let mut rows = (0..episode.rows()).filter(whole);
         let first = rows.next()?;
@@ -69,7 +69,7 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
         ))
     };
     for (i, sensor) in layout.sensors.iter().enumerate() {
-        let Some((first, later, dt)) = seen(&sensor.name) else {
+        let Some((first, later, dt)) = seen(sensor) else {
             continue;
         };
         let rate = |k: usize| {
@@ -127,7 +127,7 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
             (Reads::Body(b), "framelinvel" | "frameangvel") => plant.free_joint(b),
             _ => None,
         };
-        let Some((joint, (mut first, ..))) = joint.zip(seen(&sensor.name)) else {
+        let Some((joint, (mut first, ..))) = joint.zip(seen(sensor)) else {
             continue;
         };
         let joint = &layout.joints[joint];
@@ -238,6 +238,33 @@ mod tests {
         assert!(is_near(&found.qvel, spin.as_slice()), "{:?}", found.qvel);
         let found = given_start(&plant, &log("spin", &|_| vec![1.0, 2.0, 3.0]));
         assert_eq!(found.qvel, [1.0, 2.0, 3.0]);
+    }
+
+    /// Symptom: "qpos holds a value that is not finite" where a tracker was lost in the first rows.
+    /// Cause: a quaternion of zeros has no direction, and the start took it for an orientation.
+    #[test]
+    fn a_start_takes_no_orientation_from_zeros() {
+        let plant = Plant::of(&Scene::from_xml("pendulum", PENDULUM, &[]).unwrap()).unwrap();
+        let turn = |k: usize| match k {
+            0..3 => [0.0; 4],
+            _ => [0.6, 0.0, 0.8, 0.0],
+        };
+        let mut episode = Episode {
+            time: (0..20).map(|k| 0.01 * f64::from(k)).collect(),
+            channels: vec![ChannelColumns {
+                name: "turn".into(),
+                len: 4,
+            }],
+            readings: (0..20).flat_map(turn).collect(),
+            ..Episode::default()
+        };
+        let found = given_start(&plant, &episode);
+        assert_eq!((found.qpos, found.qvel), (turn(3).to_vec(), vec![0.0; 3]));
+        episode.initial = Some(asid_core::episode::InitialState {
+            qpos: vec![0.0; 4],
+            qvel: vec![0.0; 3],
+        });
+        assert_eq!(given_start(&plant, &episode).qpos, turn(3));
     }
 
     /// Symptom: replays of a thrown body began without the spin that a sensor reads. Cause: speeds

@@ -10,6 +10,7 @@ mod csv;
 mod delay;
 mod mapping;
 mod notes;
+mod orientations;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod reader;

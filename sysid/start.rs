@@ -4,7 +4,7 @@ use asid_core::Episode;
 use asid_core::episode::InitialState;
 use asid_core::layout::{JointKind, Layout};
 use asid_core::problem::home;
-use asid_core::signal::{rotation_difference, unit_quaternion};
+use asid_core::signal::{orientation, rotation_difference, unit_quaternion};
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -24,6 +24,7 @@ pub fn start_of(plant: &Plant, episode: &Episode) -> (InitialState, Vec<usize>) 
     let (qpos, qvel) = home(layout);
     let mut state = InitialState { qpos, qvel };
     first_readings(plant, episode, &mut state);
+    let read = state.qpos.clone();
     let mut open: Vec<usize> = (0..2 * layout.nv).collect();
     if let Some(given) = &episode.initial {
         let fill = |to: &mut [f64], from: &[f64]| {
@@ -35,10 +36,13 @@ pub fn start_of(plant: &Plant, episode: &Episode) -> (InitialState, Vec<usize>) 
         fill(&mut state.qvel, &given.qvel);
         open = open_coordinates(layout, given);
     }
-    for joint in &layout.joints {
-        if let Some(at) = quaternion(joint) {
-            let turn = unit_quaternion(&state.qpos[at..at + 4]);
-            state.qpos[at..at + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+    for at in layout.quaternions() {
+        // One that is no orientation gives none.
+        match orientation(&state.qpos[at..at + 4]) {
+            Some(turn) => {
+                state.qpos[at..at + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+            }
+            None => state.qpos[at..at + 4].copy_from_slice(&read[at..at + 4]),
         }
     }
     (state, open)
@@ -55,7 +59,8 @@ fn quaternion(joint: &asid_core::layout::Joint) -> Option<usize> {
 
 /// Coordinates that a state leaves open.
 ///
-/// A quaternion with a missing component leaves the whole orientation open.
+/// A quaternion with a missing component, or that is no orientation, leaves the whole orientation
+/// open.
 fn open_coordinates(layout: &Layout, given: &InitialState) -> Vec<usize> {
     let mut open = Vec::new();
     for joint in &layout.joints {
@@ -71,7 +76,7 @@ fn open_coordinates(layout: &Layout, given: &InitialState) -> Vec<usize> {
                 .map(|k| joint.qvel + k),
         );
         if let Some(at) = quaternion(joint)
-            && (at..at + 4).any(missing)
+            && orientation(&given.qpos[at..at + 4]).is_none()
         {
             open.extend((0..3).map(|k| joint.qvel + places + k));
         }
@@ -93,9 +98,9 @@ fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
             continue;
         };
         let whole = |k: &usize| {
-            episode.reading(*k)[range.clone()]
-                .iter()
-                .all(|x| x.is_finite())
+            let reading = &episode.reading(*k)[range.clone()];
+            let is_read = reading.iter().all(|x| x.is_finite());
+            is_read && (!sensor.is_orientation() || orientation(reading).is_some())
         };
         let rows: Vec<usize> = (0..episode.rows()).filter(whole).take(ROWS).collect();
         let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else {
@@ -216,6 +221,29 @@ mod tests {
             ..Episode::default()
         };
         (start_of(&plant, &episode).0, first)
+    }
+
+    /// Symptom: "qpos holds a value that is not finite" where a tracker was lost in the first row.
+    /// Cause: zeros were taken for an orientation, and have no direction.
+    #[test]
+    fn zeros_give_no_orientation_of_a_start() {
+        let plant = Plant::of(&Scene::from_xml("s", BALL, &[]).unwrap()).unwrap();
+        let (lost, read) = ([0.0; 4], [0.6, 0.0, 0.0, 0.8]);
+        let episode = Episode {
+            time: vec![0.0, 0.01, 0.02],
+            channels: vec![ChannelColumns {
+                name: "q".into(),
+                len: 4,
+            }],
+            readings: [lost, read, read].concat(),
+            initial: Some(InitialState {
+                qpos: lost.to_vec(),
+                qvel: vec![0.0; 3],
+            }),
+            ..Episode::default()
+        };
+        let (start, open) = start_of(&plant, &episode);
+        assert_eq!((start.qpos, open), (read.to_vec(), vec![0, 1, 2]));
     }
 
     /// Symptom: arbitrary estimates and residuals of hundreds of noises on logs of a turning body

@@ -91,6 +91,12 @@ impl Sensor {
     pub fn unit(&self) -> &'static str {
         sensor_unit(&self.kind)
     }
+
+    /// Whether it reads an orientation, as a quaternion `w x y z`.
+    #[must_use]
+    pub fn is_orientation(&self) -> bool {
+        self.len == 4
+    }
 }
 
 /// Unit of the readings of a sensor of this kind, in SI; empty if there is none.

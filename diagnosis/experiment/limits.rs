@@ -26,11 +26,20 @@ pub(super) struct Limits<'b> {
     shown: Trajectory,
 }
 
-/// Returns the smallest and the largest of some values.
-fn extremes<'v>(values: impl Iterator<Item = &'v f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
-        [low.min(*x), high.max(*x)]
-    })
+/// Returns the smallest and the largest of some values; NaN if one is NaN, as after a divergence.
+///
+/// `f64::min` and `f64::max` pass over NaN.
+fn extremes<'v>(mut values: impl Iterator<Item = &'v f64>) -> [f64; 2] {
+    let widen = |[low, high]: [f64; 2], x: &f64| {
+        (!x.is_nan()).then_some([low.min(*x), high.max(*x)])
+    };
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    values.try_fold(none, widen).unwrap_or([f64::NAN; 2])
+}
+
+/// Returns the largest magnitude of values with these extremes; NaN if they are.
+fn largest([low, high]: [f64; 2]) -> f64 {
+    if low.is_nan() { low } else { high.max(-low) }
 }
 
 impl<'b> Limits<'b> {
@@ -54,11 +63,11 @@ impl<'b> Limits<'b> {
             for dof in joint.qvel..joint.qvel + joint.kind.qvel_len() {
                 let fastest = |t: &Trajectory| {
                     let rows = t.episodes.iter();
-                    let [low, high] =
-                        extremes(rows.flat_map(|e| e.qvel.iter().skip(dof).step_by(layout.nv)));
-                    high.max(-low)
+                    largest(extremes(
+                        rows.flat_map(|e| e.qvel.iter().skip(dof).step_by(layout.nv)),
+                    ))
                 };
-                // NaN, after a divergence, keeps no limit.
+                // A comparison with NaN is false: a motion that diverged keeps no limit.
                 let keeps = fastest(&new) <= FASTER * fastest(&self.shown);
                 if !keeps {
                     return Ok(false);
@@ -80,9 +89,15 @@ impl<'b> Limits<'b> {
             let rows = t.episodes.iter();
             extremes(rows.flat_map(|e| e.qpos.iter().skip(joint.qpos).step_by(layout.nq)))
         };
-        let ([was_low, was_high], [is_low, is_high]) = (reached(&self.shown), reached(new));
-        is_low >= (low + margin).min(was_low) && is_high <= (high - margin).max(was_high)
+        let (was, is) = (reached(&self.shown), reached(new));
+        is_within(is, [low + margin, high - margin], was)
     }
+}
+
+/// Whether values with the extremes `is` stay in a range, or within the extremes `was`; false if
+/// they are NaN.
+fn is_within(is: [f64; 2], [low, high]: [f64; 2], was: [f64; 2]) -> bool {
+    is[0] >= low.min(was[0]) && is[1] <= high.max(was[1])
 }
 
 /// Returns the trajectory of the machine in some episodes, as replayed with an explanation.
@@ -97,4 +112,30 @@ fn played(bench: &Bench, record: &Record, (trials, of): Rival<'_>) -> Result<Tra
         &point,
         bench.machine.threads,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: a motion in which the model diverges was proposed as within all limits. Cause: the
+    /// smallest and the largest of its positions and speeds were those before it diverged.
+    #[test]
+    fn a_motion_that_diverges_keeps_no_limit() {
+        let whole = [0.1, -0.4, 0.3];
+        assert_eq!(extremes(whole.iter()), [-0.4, 0.3]);
+        assert!(is_within(extremes(whole.iter()), [-1.0, 1.0], [0.0, 0.0]));
+        assert!(largest(extremes(whole.iter())) <= 1.0);
+        for place in 0..3 {
+            let mut broken = whole;
+            broken[place] = f64::NAN;
+            let found = extremes(broken.iter());
+            assert!(!is_within(found, [-1.0, 1.0], [0.0, 0.0]), "{broken:?}");
+            let keeps = largest(found) <= 1.0;
+            assert!(!keeps, "{broken:?}");
+        }
+        // Where the logs went beyond the range, so may the motion.
+        assert!(is_within([-1.1, 0.0], [-1.0, 1.0], [-1.2, 0.0]));
+        assert!(!is_within([-1.3, 0.0], [-1.0, 1.0], [-1.2, 0.0]));
+    }
 }

@@ -4,7 +4,7 @@ mod of_state;
 
 use std::ops::Range;
 
-use asid_core::signal::{rotation_difference, unit_quaternion};
+use asid_core::signal::{orientation, rotation_difference, unit_quaternion};
 use asid_mjcf::Plant;
 use nalgebra::Vector3;
 
@@ -58,13 +58,15 @@ fn fill(time: &[f64], values: &mut [f64]) -> bool {
 
 /// Gives each quaternion of a series (four components) the sign that is closer to the one before.
 ///
-/// `q` and `-q` are the same orientation, but points between them are not orientations.
+/// `q` and `-q` are the same orientation, but points between them are not orientations. One that is
+/// no orientation, as of a lost tracker, becomes missing.
 fn align_signs(series: &mut [Vec<f64>]) {
     let rows = series.first().map_or(0, Vec::len);
     let mut before: Option<Vec<f64>> = None;
     for k in 0..rows {
         let mut q: Vec<f64> = series.iter().map(|s| s[k]).collect();
-        if !q.iter().all(|x| x.is_finite()) {
+        if orientation(&q).is_none() {
+            series.iter_mut().for_each(|s| s[k] = f64::NAN);
             continue;
         }
         if let Some(before) = before
@@ -306,9 +308,11 @@ pub fn start(
         let position = if i < layout.nv { noise[i] } else { 0.0 };
         (OPEN * scale[i]).max(10.0 * position).powi(2)
     };
+    let unknown: Vec<f64> = (0..nx).map(wide).collect();
     let mut start = Start {
         mean: vec![0.0; nx],
-        variance: (0..nx).map(wide).collect(),
+        variance: unknown.clone(),
+        unknown,
     };
     if let Some((state, open)) = given {
         let state = [&state.qpos[..], &state.qvel[..]].concat();
@@ -351,11 +355,12 @@ pub fn start_of_segment(
     scales: (&[f64], &[f64]),
 ) -> Start {
     let nx = 2 * plant.layout.nv;
+    let open = (0..nx).map(|i| open_by_reading(i, scales).powi(2));
+    let unknown: Vec<f64> = open.collect();
     let mut start = Start {
         mean: vec![0.0; nx],
-        variance: (0..nx)
-            .map(|i| open_by_reading(i, scales).powi(2))
-            .collect(),
+        variance: unknown.clone(),
+        unknown,
     };
     difference(&plant.layout, read, first, &mut start.mean);
     start

@@ -86,6 +86,11 @@ pub struct Start {
     pub mean: Vec<f64>,
     /// Variances, `nx`.
     pub variance: Vec<f64>,
+    /// Variances of a state of which nothing is known, `nx`.
+    ///
+    /// The filter restarts with them behind a row that the engine could not step: an initial state
+    /// that the log gives says nothing of the state there.
+    pub unknown: Vec<f64>,
 }
 
 /// One episode as the filter sees it.

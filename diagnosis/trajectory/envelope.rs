@@ -68,7 +68,7 @@ impl Trajectory {
         largest
     }
 
-    /// Returns the standard deviation of a sensor's readings.
+    /// Returns the spread of a sensor's readings: of the entry of a vector that moves most.
     #[must_use]
     pub fn reading(&self, sensor: &str) -> f64 {
         let found = self.readings.iter().find(|(name, _)| name == sensor);
@@ -125,29 +125,69 @@ fn movers(plant: &Plant, geom: usize) -> Vec<usize> {
     bodies
 }
 
-/// Returns the standard deviation of the readings of each sensor, with its name.
+/// Returns the spread of the readings of each sensor, with its name: the standard deviation of the
+/// entry that moves most.
+///
+/// A vector has one spread, and an entry that stands still does not tell how far the others move.
 pub(super) fn spreads(logs: &Logs) -> Vec<(String, f64)> {
     let width = logs.width();
-    let mut at = 0;
-    let mut out = Vec::new();
-    for (i, sensor) in logs.sensors.iter().enumerate() {
-        let own = logs.entries.iter().filter(|e| e.sensor == i).count();
-        let len = if sensor.rotation { 4 } else { own };
-        let mut values = Vec::new();
-        for e in &logs.episodes {
-            values.extend(
-                e.readings
-                    .iter()
-                    .skip(at)
-                    .step_by(width)
-                    .filter(|x| x.is_finite()),
-            );
-        }
-        let n = values.len().max(1) as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-        out.push((sensor.name.clone(), variance.sqrt()));
-        at += len;
+    let spread = |column: usize| {
+        let rows = logs.episodes.iter().flat_map(|e| e.readings.chunks_exact(width));
+        deviation(rows.map(|row| row[column]).filter(|x| x.is_finite()))
+    };
+    let places = logs.places();
+    let each = places.map(|(sensor, columns)| {
+        let widest = columns.map(spread).fold(0.0, f64::max);
+        (sensor.name.clone(), widest)
+    });
+    each.collect()
+}
+
+/// Returns the standard deviation of some values; 0 if there are none.
+fn deviation(values: impl Iterator<Item = f64>) -> f64 {
+    let values: Vec<f64> = values.collect();
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+    variance.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::episode::ChannelColumns;
+    use asid_core::{Episode, Scene};
+
+    use super::*;
+
+    /// Symptom: the steps of a tracker were searched for at the width of its noise. Cause: the
+    /// spread of a vector was that of its first entry, along which the body did not move.
+    #[test]
+    fn the_spread_of_a_vector_is_that_of_the_entry_that_moves_most() {
+        let scene = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="0.1"/>
+            </body></worldbody><sensor><framepos name="place" objtype="xbody" objname="b"/>
+            <framelinvel name="speed" objtype="xbody" objname="b"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("b", scene, &[]).unwrap()).unwrap();
+        let channel = |name: &str| ChannelColumns {
+            name: name.into(),
+            len: 3,
+        };
+        // Equally often at either end: the deviation is half of the way.
+        let row = |k: usize| {
+            let end = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let y = if k == 0 { f64::NAN } else { 0.01 * end };
+            [0.5, y, 0.3 * end, 7.0 * end, 0.0, 0.0]
+        };
+        let episode = Episode {
+            time: (0..40).map(|k| 0.01 * f64::from(k)).collect(),
+            channels: ["place", "speed"].map(channel).into(),
+            readings: (0..40).flat_map(row).collect(),
+            ..Episode::default()
+        };
+        let sensors = ["place".to_owned(), "speed".to_owned()];
+        let logs = Logs::new(&plant, &sensors, vec![("log".into(), episode)]).unwrap();
+        let found = spreads(&logs);
+        assert_eq!((&*found[0].0, &*found[1].0), ("place", "speed"));
+        assert!((found[0].1 - 0.3).abs() < 1e-12, "{found:?}");
+        assert!((found[1].1 - 7.0).abs() < 1e-12, "{found:?}");
     }
-    out
 }

@@ -30,6 +30,8 @@ pub struct LogNotes {
     pub held: usize,
     /// Sensors whose angles jumped by a turn, with the number of jumps that were taken out.
     pub turns: Vec<(String, usize)>,
+    /// Orientations that are no rotation and count as missing: what they are of, and their number.
+    pub lost: Vec<(String, usize)>,
     /// Remarks of readers of other stacks' files: unreadable streams, disagreeing clocks.
     pub remarks: Vec<String>,
 }
@@ -113,6 +115,11 @@ impl LogNotes {
         for (sensor, jumps) in &self.turns {
             all.push(format!(
                 "the angle `{sensor}` jumped by a turn {jumps} times, as one that is reported within one turn: its turns are counted"
+            ));
+        }
+        for (name, count) in &self.lost {
+            all.push(format!(
+                "{count} orientations of `{name}` are no rotation, as of a lost tracker (a norm below 0.5 or above 2): they count as missing"
             ));
         }
         all.extend(self.remarks.iter().cloned());

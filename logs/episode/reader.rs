@@ -7,7 +7,7 @@ use asid_core::{Error, Result};
 use super::mapping::{ColumnMapping, Source};
 use super::notes::LogNotes;
 use super::turns::Angle;
-use super::{clock, delay};
+use super::{clock, delay, orientations};
 
 /// A column of the log, and the conversion of its numbers to a quantity.
 #[derive(Clone, Copy, Debug)]
@@ -227,6 +227,7 @@ impl<'a> Reader<'a> {
         }
         let numbers: Vec<usize> = rows.iter().map(|&k| self.numbers[k]).collect();
         clock::check_duration(&episode.time, &numbers, self.layout.timestep)?;
+        self.notes.lost = orientations::settle_all(episode, self.layout);
         if episode.readings.iter().all(|x| x.is_nan()) {
             return Err("every reading is missing".into());
         }

@@ -42,7 +42,7 @@ pub struct Gap {
     pub refined: f64,
     /// Share of the excess squared gap that they close, negative where they widen it; null where there is none.
     pub closed: Option<f64>,
-    /// 95 % interval of it, by a bootstrap over episodes.
+    /// 95 % interval of it, by a bootstrap over episodes; null where fewer than three are held out.
     pub closed_interval95: Option<[f64; 2]>,
     /// By what it goes with; `None` where there is none.
     #[serde(default)]

@@ -277,6 +277,9 @@ fn a_start_that_the_log_gives_beats_its_readings() {
         assert!((deviation(&given, i) - GIVEN * scale[i]).abs() < 1e-12);
     }
     assert!((deviation(&given, 1) - OPEN * scale[1]).abs() < 1e-12);
+    // It says nothing of the state where a filter restarts.
+    let open = start(&plant, None, &first, (&scale, &noise));
+    assert_eq!(given.unknown, open.variance);
     // Without a given initial state all coordinates are open, a position by at least ten standard
     // deviations of its readings.
     let open = start(&plant, None, &first, (&scale, &noise));

@@ -254,6 +254,7 @@ impl<'a> Owned<'a> {
             start: Start {
                 mean: some(&problem.start.mean, &own),
                 variance: some(&problem.start.variance, &own),
+                unknown: some(&problem.start.unknown, &own),
             },
             free: pick(problem.free, (1, &[0]), (nv, dofs)),
             noise: NoiseModel {

@@ -68,16 +68,17 @@ impl<'a> Filter<'a> {
             scratch: vec![0.0; nz * nz],
             log_likelihood: vec![[0.0; 2]; ns],
         };
-        filter.begin();
+        filter.begin(&problem.start.variance);
         filter.mean[..nx].copy_from_slice(&problem.start.mean);
         filter
     }
 
-    /// Sets the state to the prior of the initial state, centred on the trajectory.
-    pub(super) fn begin(&mut self) {
+    /// Centres the state on the trajectory, with some variances of the state and the stationary
+    /// ones of the force.
+    fn begin(&mut self, variances: &[f64]) {
         self.mean.fill(0.0);
         self.covariance.fill(0.0);
-        for (i, v) in self.problem.start.variance.iter().enumerate() {
+        for (i, v) in variances.iter().enumerate() {
             self.covariance[i * self.nz + i] = *v;
         }
         for (j, q) in self.noise.q.iter().enumerate() {
@@ -196,7 +197,7 @@ impl<'a> Filter<'a> {
     pub(super) fn predict(&mut self, k: usize) {
         let (nx, nv, nz) = (self.nx, self.nv, self.nz);
         if !self.carries(k) {
-            self.begin();
+            self.begin(&self.problem.start.unknown);
             return;
         }
         self.set_transition(k);

@@ -226,6 +226,7 @@ mod tests {
                 start: Start {
                     mean: vec![0.1, -0.2],
                     variance: vec![0.5, 2.0],
+                    unknown: vec![0.5, 2.0],
                 },
                 noise: NoiseModel {
                     q: vec![0.0],

@@ -82,6 +82,7 @@ impl Case {
             start: Start {
                 mean: draw(nx),
                 variance: positive(draw(nx)),
+                unknown: positive(draw(nx)),
             },
             free,
             noise: NoiseModel {
@@ -143,6 +144,7 @@ impl Case {
             start: Start {
                 mean: vec![0.0; 2],
                 variance: vec![1.0; 2],
+                unknown: vec![1.0; 2],
             },
             free: Vec::new(),
             noise,
@@ -170,6 +172,7 @@ impl Case {
         let mut start = self.start.clone();
         if range.start > 0 {
             start.mean.fill(0.0);
+            start.variance.clone_from(&start.unknown);
         }
         let linear = &self.linear;
         Self {

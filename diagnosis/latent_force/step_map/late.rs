@@ -258,6 +258,7 @@ mod tests {
             let start = Start {
                 mean: vec![0.0; 2],
                 variance: vec![1.0; 2],
+                unknown: vec![1.0; 2],
             };
             let likelihood = |unit: f64| {
                 let noise = NoiseModel {

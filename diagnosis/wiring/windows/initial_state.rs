@@ -33,6 +33,13 @@ impl Windows<'_> {
                         placed[layout.joints[j].qvel] = true;
                     }
                 }
+                (Reads::Joint(j), "ballquat") => {
+                    if let Some(turned) = orientation(record, &turns(first), window.start, half) {
+                        let joint = &layout.joints[j];
+                        set(turned, (&mut qpos[joint.qpos..], &mut qvel[joint.qvel..]));
+                        placed[joint.qvel] = true;
+                    }
+                }
                 (Reads::Body(b), "framepos") => {
                     let Some(j) = self.plant.free_joint(b) else {
                         continue;
@@ -48,12 +55,9 @@ impl Windows<'_> {
                     let Some(j) = self.plant.free_joint(b) else {
                         continue;
                     };
-                    if let Some((turn, own)) =
-                        orientation(record, &turns(first), window.start, half)
-                    {
+                    if let Some(turned) = orientation(record, &turns(first), window.start, half) {
                         let (q, v) = (layout.joints[j].qpos + 3, layout.joints[j].qvel + 3);
-                        qpos[q..q + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
-                        qvel[v..v + 3].copy_from_slice(own.as_slice());
+                        set(turned, (&mut qpos[q..], &mut qvel[v..]));
                     }
                 }
                 _ => {}
@@ -61,16 +65,30 @@ impl Windows<'_> {
         }
         // Speeds that only a velocity sensor reads.
         for &(index, first) in &self.sensors {
-            if let (Reads::Joint(j), "jointvel") =
-                (self.plant.sensors[index], &*layout.sensors[index].kind)
+            let sensor = &layout.sensors[index];
+            if let (Reads::Joint(j), "jointvel" | "ballangvel") =
+                (self.plant.sensors[index], &*sensor.kind)
                 && !placed[layout.joints[j].qvel]
-                && let Some((v, _)) = local(first)
             {
-                qvel[layout.joints[j].qvel] = v;
+                for i in 0..sensor.len {
+                    if let Some((v, _)) = local(first + i) {
+                        qvel[layout.joints[j].qvel + i] = v;
+                    }
+                }
             }
         }
         (qpos, qvel)
     }
+}
+
+/// Writes an orientation and the angular velocity about the body's own axes to where a joint has
+/// them in `qpos` and `qvel`.
+fn set(
+    (turn, own): (UnitQuaternion<f64>, Vector3<f64>),
+    (qpos, qvel): (&mut [f64], &mut [f64]),
+) {
+    qpos[..4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+    qvel[..3].copy_from_slice(own.as_slice());
 }
 
 /// Orientation at a time, and the angular velocity about the body's own axes, rad/s.

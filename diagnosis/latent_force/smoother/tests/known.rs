@@ -150,6 +150,37 @@ fn a_row_that_the_engine_did_not_carry_splits_the_walk_in_two() {
     }
 }
 
+/// Symptom: behind a row that an engine could not step, the states stayed on the trajectory,
+/// whatever was read, where the log gives its initial state.
+///
+/// Cause: the filter restarted there with the variance of that initial state, a millionth of an
+/// unknown one.
+#[test]
+fn behind_a_row_that_failed_a_given_start_says_nothing() {
+    let noise = NoiseModel {
+        q: vec![1e-6],
+        tau: vec![0.1],
+        white: vec![1e-6],
+        r: vec![1e-6],
+    };
+    // A body at rest at 0, and behind the row at rest at 5 m.
+    let place = |k: usize| if k < 10 { 0.0 } else { 5.0 };
+    let places: Vec<f64> = (0..20).map(place).collect();
+    let mut case = Case::slide(1.0, 0.01, &places, noise);
+    case.start.variance = vec![1e-12; 2];
+    case.start.unknown = vec![100.0; 2];
+    case.linear.defect[2 * 9] = f64::NAN;
+    let found = smooth(case.problem(), &case.noise);
+    for (k, state) in found.change.chunks_exact(2).enumerate() {
+        // The prior draws the place by the ratio of the variances, 1e-8 of it.
+        assert!((state[0] - place(k)).abs() < 1e-6, "row {k}: {state:?}");
+        assert!(state[1].abs() < 1e-4, "row {k}: {state:?}");
+    }
+    // In the first row the initial state is still known.
+    assert!(found.change_variance[0] <= 1e-12);
+    assert!(found.change_variance[2 * 10] > 1e-8);
+}
+
 #[test]
 fn a_column_that_is_zero_all_along_leaves_the_others_as_they_are() {
     let (force, mass, dt) = (3.0, 2.0, 0.01);
