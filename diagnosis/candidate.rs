@@ -10,6 +10,7 @@ use asid_effects::EffectSpec;
 use asid_effects::{Acts, Effect, EffectParameter, Reference, Start};
 use asid_mjcf::Plant;
 
+use crate::chance;
 use crate::machine::Machine;
 use crate::trajectory::Trajectory;
 
@@ -117,6 +118,19 @@ impl Candidate {
             .collect()
     }
 
+    /// Returns the number of columns of each form of the candidate: one form for each start, and
+    /// where segments are `replayed` one for each value at which it is large.
+    #[must_use]
+    pub fn forms(&self, replayed: bool) -> Vec<usize> {
+        // An effect without a derivative has a secant.
+        let columns = self.slopes().len().max(1);
+        let mut forms = vec![columns; self.starts.len().max(1)];
+        if replayed {
+            forms.extend(self.large.iter().map(|_| 1));
+        }
+        forms
+    }
+
     /// Whether a parameter applies to all episodes, or to one that is fitted to.
     fn is_fitted(&self, parameter: &EffectParameter) -> bool {
         parameter.episode.is_none_or(|e| e < self.episodes)
@@ -141,6 +155,17 @@ fn within_tolerance(candidate: &Candidate, plant: &Plant, shown: &Trajectory) ->
 #[must_use]
 pub fn nameable(candidates: &[Candidate]) -> usize {
     candidates.iter().filter(|c| !c.is_tolerance).count()
+}
+
+/// Returns the evidence that the best of the candidates that can be named exceeds with at most
+/// probability `rate` if none of them acts.
+///
+/// Each form of a candidate is a chance of its own; `replayed` is as in [`Candidate::forms`].
+#[must_use]
+pub fn threshold(candidates: &[Candidate], replayed: bool, rate: f64) -> f64 {
+    let named = candidates.iter().filter(|c| !c.is_tolerance);
+    let forms: Vec<usize> = named.flat_map(|c| c.forms(replayed)).collect();
+    chance::threshold(&forms, rate)
 }
 
 /// Returns the study's parameter that fits the whole mass of a body, if a target is one of its

@@ -30,9 +30,8 @@ pub(super) struct Limits<'b> {
 ///
 /// `f64::min` and `f64::max` pass over NaN.
 fn extremes<'v>(mut values: impl Iterator<Item = &'v f64>) -> [f64; 2] {
-    let widen = |[low, high]: [f64; 2], x: &f64| {
-        (!x.is_nan()).then_some([low.min(*x), high.max(*x)])
-    };
+    let widen =
+        |[low, high]: [f64; 2], x: &f64| (!x.is_nan()).then_some([low.min(*x), high.max(*x)]);
     let none = [f64::INFINITY, f64::NEG_INFINITY];
     values.try_fold(none, widen).unwrap_or([f64::NAN; 2])
 }

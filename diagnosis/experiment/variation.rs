@@ -146,6 +146,9 @@ mod tests {
         // A quarter turn about z away from it.
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let turned = rotation_difference(&[half, 0.0, 0.0, half], &varied.reading(0)[3..]);
-        assert!((turned[2] - std::f64::consts::FRAC_PI_2).abs() < 1e-12, "{turned:?}");
+        assert!(
+            (turned[2] - std::f64::consts::FRAC_PI_2).abs() < 1e-12,
+            "{turned:?}"
+        );
     }
 }

@@ -7,6 +7,7 @@
 //! they are: they contain the many small errors of every machine.
 
 use asid_effects::Reach;
+use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
 
@@ -47,6 +48,18 @@ pub struct Scales {
     alone: Option<Vec<usize>>,
 }
 
+/// One of the regressions, and the one at the next larger variance on the same columns.
+pub struct OneScale<'s> {
+    /// The regression.
+    pub sum: &'s Regression,
+    /// Indices of its columns among all columns, in ascending order.
+    pub columns: Vec<usize>,
+    /// Its variance, relative to that of the estimate.
+    pub scale: f64,
+    /// Variance and `X'X` of the one at the next larger variance; `None` at the largest.
+    pub wider: Option<(f64, DMatrix<f64>)>,
+}
+
 impl Scales {
     /// Computes the regressions on the columns of some candidates along an estimate.
     #[must_use]
@@ -85,6 +98,39 @@ impl Scales {
         let holds = |own: &Vec<usize>| columns.iter().all(|c| own.binary_search(c).is_ok());
         let joints = self.joints.iter().map(|joint| &joint.columns);
         joints.chain(&self.alone).any(holds)
+    }
+
+    /// Returns all regressions, at common scales first and in the order of [`Scales::common`].
+    #[must_use]
+    pub fn each(&self) -> Vec<OneScale<'_>> {
+        let mut all: Vec<OneScale<'_>> = Vec::new();
+        let n = self.common.first().map_or(0, |sum| sum.gram.nrows());
+        for (sum, scale) in self.common.iter().zip(SCALES) {
+            let wider = all.last().map(|w| (w.scale, w.sum.gram.clone()));
+            all.push(OneScale {
+                sum,
+                columns: (0..n).collect(),
+                scale,
+                wider,
+            });
+        }
+        for joint in &self.joints {
+            let own = |sum: &Regression| {
+                let rows = sum.gram.select_rows(&joint.columns);
+                rows.select_columns(&joint.columns)
+            };
+            let mut wider = self.common.first().map(|sum| (1.0, own(sum)));
+            for (sum, scale) in joint.sums.iter().zip(AT_A_JOINT) {
+                let next = Some((scale, sum.gram.clone()));
+                all.push(OneScale {
+                    sum,
+                    columns: joint.columns.clone(),
+                    scale,
+                    wider: std::mem::replace(&mut wider, next),
+                });
+            }
+        }
+        all
     }
 
     /// Regressions at common scales, and those on some columns at the scales of one joint.

@@ -32,8 +32,7 @@ mod twins;
 
 use asid_core::{Progress, Result};
 
-use crate::candidate::{Candidate, nameable};
-use crate::chance::threshold;
+use crate::candidate::{Candidate, threshold};
 use crate::settings::Breadth;
 
 use super::context::Context;
@@ -230,7 +229,7 @@ pub fn search(
         progress,
         without: &none.estimate,
         at_first: none.estimate.missing(context),
-        threshold: threshold(nameable(candidates), breadth.false_alarms),
+        threshold: threshold(candidates, context.has_segments(), breadth.false_alarms),
     };
     let mut none = none.clone();
     let mut path = search.follow(Path::from(Set::without_effects(&none)), &mut none)?;

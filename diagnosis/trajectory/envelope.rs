@@ -132,7 +132,10 @@ fn movers(plant: &Plant, geom: usize) -> Vec<usize> {
 pub(super) fn spreads(logs: &Logs) -> Vec<(String, f64)> {
     let width = logs.width();
     let spread = |column: usize| {
-        let rows = logs.episodes.iter().flat_map(|e| e.readings.chunks_exact(width));
+        let rows = logs
+            .episodes
+            .iter()
+            .flat_map(|e| e.readings.chunks_exact(width));
         deviation(rows.map(|row| row[column]).filter(|x| x.is_finite()))
     };
     let places = logs.places();

@@ -130,6 +130,9 @@ mod tests {
         let lost = [("imu".to_owned(), 2), ("qpos.puck".to_owned(), 1)];
         assert_eq!(notes.lost, lost);
         let said = notes.lines().join("; ");
-        assert!(said.contains("2 orientations of `imu` are no rotation"), "{said}");
+        assert!(
+            said.contains("2 orientations of `imu` are no rotation"),
+            "{said}"
+        );
     }
 }

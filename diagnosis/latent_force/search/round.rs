@@ -4,8 +4,7 @@
 use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
-use crate::candidate::{Candidate, nameable};
-use crate::chance::threshold;
+use crate::candidate::{Candidate, threshold};
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::{Estimate, Missing};
 use crate::latent_force::fit::Fitted;
@@ -187,7 +186,8 @@ impl Upon<'_> {
 
     /// Evidence by which a name must exceed the base.
     pub(super) fn threshold(&self) -> f64 {
-        threshold(nameable(self.candidates), self.breadth.false_alarms)
+        let replayed = self.context.has_segments();
+        threshold(self.candidates, replayed, self.breadth.false_alarms)
     }
 
     /// Candidates of a screened set.

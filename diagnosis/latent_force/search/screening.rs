@@ -5,7 +5,6 @@ use asid_core::Result;
 use nalgebra::DMatrix;
 
 use crate::candidate::{Candidate, nameable};
-use crate::chance::threshold;
 use crate::latent_force::columns::{Columns, Form, Leads};
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
@@ -129,7 +128,7 @@ impl Upon<'_> {
             .map_or(0.0, |_| of_names(scales, columns, ranked, self.price()));
         let found = ranked.iter().find(|s| s.forms.len() == 1);
         let found = found.map_or(0.0, |s| s.gain);
-        let sight = self.sight((&scales.common, found), columns, some);
+        let sight = self.sight((scales, found), columns, some);
         Ok(Screening {
             look,
             alike,
@@ -161,25 +160,26 @@ impl Upon<'_> {
         leads
     }
 
-    /// What a screening could have shown, at the most likely of the scales of `q`; `found` is the
-    /// evidence of its best candidate, prior odds included.
+    /// What a screening could have shown; `found` is the evidence of its best candidate, prior odds
+    /// included.
+    ///
+    /// The limits are those at the most likely of the scales of `q`.
     fn sight(
         &self,
-        (sums, found): (&[Regression], f64),
+        (scales, found): (&Scales, f64),
         columns: &Columns,
         some: &[Candidate],
     ) -> Sight {
         let likely =
             |a: &&Regression, b: &&Regression| a.log_likelihood.total_cmp(&b.log_likelihood);
-        let Some(sum) = sums.iter().max_by(likely) else {
+        let Some(sum) = scales.common.iter().max_by(likely) else {
             return Sight::default();
         };
-        let threshold = threshold(nameable(self.candidates), self.breadth.false_alarms);
-        let mut limits = limits(sum, columns, some, threshold);
+        let mut limits = limits(sum, columns, some, self.threshold());
         let odds = |f: &Form| log_prior(self.context.plant(), some, &[f.candidate]);
         let odds: Vec<f64> = columns.forms.iter().map(odds).collect();
         let all = (columns, &odds[..]);
-        let mut rehearsal = rehearse(sum, all, (&limits, found), self.breadth.seed);
+        let mut rehearsal = rehearse(scales, all, (&limits, found), self.breadth.seed);
         let place = |c: &mut usize| *c = self.open[*c];
         limits.iter_mut().for_each(|l| place(&mut l.candidate));
         let taken_for = rehearsal.recognised.iter_mut().flatten();

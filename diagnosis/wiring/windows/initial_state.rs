@@ -83,10 +83,7 @@ impl Windows<'_> {
 
 /// Writes an orientation and the angular velocity about the body's own axes to where a joint has
 /// them in `qpos` and `qvel`.
-fn set(
-    (turn, own): (UnitQuaternion<f64>, Vector3<f64>),
-    (qpos, qvel): (&mut [f64], &mut [f64]),
-) {
+fn set((turn, own): (UnitQuaternion<f64>, Vector3<f64>), (qpos, qvel): (&mut [f64], &mut [f64])) {
     qpos[..4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
     qvel[..3].copy_from_slice(own.as_slice());
 }

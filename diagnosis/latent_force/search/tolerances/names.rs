@@ -3,8 +3,7 @@
 
 use asid_core::{Progress, Result};
 
-use crate::candidate::{Candidate, nameable};
-use crate::chance::threshold;
+use crate::candidate::{Candidate, threshold};
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Missing;
 use crate::latent_force::search::prune::TANGENT;
@@ -30,7 +29,7 @@ impl Tolerances {
         progress.note("fitting tolerances");
         let mut with = self.beside(set, candidates);
         with.fit(context, (breadth.rounds[1], progress))?;
-        let threshold = threshold(nameable(candidates), breadth.false_alarms);
+        let threshold = threshold(candidates, context.has_segments(), breadth.false_alarms);
         let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
         let stands = with.rises_above(set, threshold) && left(set) - left(&with) > breadth.shrinks;
         Ok(stands.then_some(with))
@@ -110,7 +109,7 @@ impl Tolerances {
             laws.join(", ")
         ));
         larger.fit(context, (breadth.rounds[1], progress))?;
-        let threshold = threshold(nameable(candidates), breadth.false_alarms);
+        let threshold = threshold(candidates, context.has_segments(), breadth.false_alarms);
         let least = set.fitted.evidence + threshold * laws.len() as f64;
         let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
         let shrinks = left(&set) - left(&larger) > breadth.shrinks;
@@ -163,7 +162,7 @@ fn needed(
     set: Set,
     (breadth, progress): (Breadth, &dyn Progress),
 ) -> Result<Set> {
-    let least = threshold(nameable(candidates), breadth.false_alarms);
+    let least = threshold(candidates, context.has_segments(), breadth.false_alarms);
     let mut set = set;
     let mut laws: Vec<String> = Vec::new();
     for &c in &set.candidates {
