@@ -4,6 +4,7 @@ mod identifiability;
 mod missing;
 mod missing_force;
 mod motion;
+mod rows;
 mod units;
 
 use asid_core::Result;
@@ -20,6 +21,7 @@ use crate::result::CheckResult;
 pub use identifiability::identifiability;
 pub use missing_force::{missing_force, windows};
 pub use motion::motion;
+pub use rows::rows;
 pub use units::units;
 
 /// Largest share of missing readings that passes the check.

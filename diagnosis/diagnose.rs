@@ -4,6 +4,7 @@ use asid_core::{Episode, Error, Layout, Progress, Result};
 
 use crate::calibration::calibrate;
 use crate::intake::Intake;
+use crate::latent_force::budget::check_rows;
 use crate::machine::Machine;
 use crate::physics::diagnose_physics;
 use crate::prepare::plain_residuals;
@@ -44,6 +45,7 @@ pub fn diagnose(
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
     enough_rows(study, &machine.plant.layout)?;
+    check_rows(&machine.plant.layout, &study.train)?;
     progress.begin("looking at the logs", 1);
     let mut intake = Intake::of(study, &machine)?;
     progress.end();

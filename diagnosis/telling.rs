@@ -252,6 +252,7 @@ impl Telling<'_> {
             checks::units(bench, self.nominal)?,
         ];
         all.extend(checks::motion(&bench.train.logs));
+        all.extend(checks::rows(&bench.train.logs, &bench.test.logs));
         all.extend(checks::memory(&bench.machine));
         all.extend(checks::identifiability(&bench.parameters, none, best));
         let repeats = self.findings.repeats;

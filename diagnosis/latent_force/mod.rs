@@ -19,6 +19,7 @@
 //! - The rest: `steps` (encoder steps), `picture` (what the report draws of the force), `left`
 //!   (what could be learned of the rest), [`pipeline`].
 
+pub mod budget;
 pub mod columns;
 pub mod context;
 pub mod detection;

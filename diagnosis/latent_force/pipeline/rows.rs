@@ -5,6 +5,7 @@ use asid_core::{Layout, Result};
 use asid_mjcf::Plant;
 
 use crate::bench::Bench;
+use crate::latent_force::budget::within_budget;
 use crate::latent_force::context::Taken;
 use crate::latent_force::initial::{from_readings, position_noise, scales};
 use crate::latent_force::segments::{cut, whole};
@@ -14,19 +15,6 @@ use crate::predict::Point;
 use crate::starts::given_start;
 use crate::study::Study;
 use crate::trajectory::{Path, Trajectory};
-
-/// Most physics steps of one walk along all logs, times degrees of freedom.
-///
-/// A walk is simulated once for each coordinate and each candidate, and both numbers grow with the
-/// degrees of freedom.
-const BUDGET: f64 = 72_000.0;
-/// Most physics steps times the square of the degrees of freedom.
-///
-/// From about six degrees of freedom on, the time of a step also grows with their number. A
-/// screening of a machine with 22 takes 500 walks at 50 us a step.
-const SQUARE_BUDGET: f64 = 432_000.0;
-/// Fewest rows of a log that are used, whatever the budget.
-const FEWEST: usize = 150;
 
 /// Trajectory quantities of the model along given states.
 pub(super) fn along(
@@ -229,22 +217,6 @@ fn with_joints(layout: &Layout, still: &[f64], (qpos, qvel): (&[f64], &[f64])) -
         }
     }
     state
-}
-
-/// The first rows of each walk, as many as the budget of physics steps allows: a screening
-/// simulates them once for each column.
-fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
-    let steps: usize = walks.iter().flat_map(|w| &w.substeps).sum();
-    let nv = nv.max(1) as f64;
-    let share = (BUDGET / nv).min(SQUARE_BUDGET / (nv * nv)) / steps.max(1) as f64;
-    if share >= 1.0 {
-        return walks;
-    }
-    let part = |w: &Walk| {
-        let rows = (share * w.len() as f64).round() as usize;
-        w.part(0..rows.max(FEWEST).min(w.len()))
-    };
-    walks.iter().map(part).collect()
 }
 
 #[cfg(test)]
