@@ -13,8 +13,9 @@ use asid::algorithms::identify::expected::{ExpectedSettings, expected_deviation}
 use asid::core::identify::Identified;
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::posterior::Edge;
+use asid::core::real_world::RealEpisode;
 use asid::core::registry::{BackendEntry, IdentifierEntry, Settings, find};
-use asid::core::{Policy, RealWorld as _, Result, Streams};
+use asid::core::{Policy, Problem, RealWorld as _, Result, Streams};
 use asid::worlds::{SimulatedWorld, TrackerErrors};
 use cart_support::{Cart, HORIZON};
 
@@ -49,22 +50,9 @@ fn identified_late(
     seed: u64,
     latency: f64,
 ) -> (Identified, f64) {
-    let task = Cart::new();
-    let parameters: [Parameter; 1] = [Cart::mass(Scale::Linear)];
-    let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
     let mut out = None;
-    task_support::on_engine(&*backend, &task, &parameters, seed, |problem, model| {
-        let streams = Streams::new(seed).child("world");
-        let signals = problem.signals;
-        let mut world =
-            SimulatedWorld::new(&task, &**model, &parameters, &[mass], signals, streams)
-                .unwrap()
-                .with_tracker(TrackerErrors {
-                    latency,
-                    ..TrackerErrors::default()
-                })
-                .unwrap();
-        let real = world.explore(&mut Push(force)).unwrap();
+    let unknown = (Cart::mass(Scale::Linear), mass);
+    pushed(unknown, force, seed, latency, &mut |problem, real| {
         let entry = find::<IdentifierEntry>(name).unwrap();
         let identifier = (entry.make)(&settings).unwrap();
         let episodes = std::slice::from_ref(&real.episode);
@@ -82,6 +70,60 @@ fn identified_late(
         out = Some((found, expected[HORIZON][0]));
     });
     out.unwrap()
+}
+
+/// Pushes a cart with this true value of an unknown, tracked with a latency, s.
+fn pushed(
+    (unknown, truth): (Parameter, f64),
+    force: f64,
+    seed: u64,
+    latency: f64,
+    learn: &mut dyn FnMut(&Problem<'_>, &RealEpisode),
+) {
+    let task = Cart::new();
+    let parameters = [unknown];
+    let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
+    task_support::on_engine(&*backend, &task, &parameters, seed, |problem, model| {
+        let streams = Streams::new(seed).child("world");
+        let signals = problem.signals;
+        let mut world =
+            SimulatedWorld::new(&task, &**model, &parameters, &[truth], signals, streams)
+                .unwrap()
+                .with_tracker(TrackerErrors {
+                    latency,
+                    ..TrackerErrors::default()
+                })
+                .unwrap();
+        let real = world.explore(&mut Push(force)).unwrap();
+        learn(problem, &real);
+    });
+}
+
+/// Symptom: `gauss-newton` panicked where every unknown is binary. Cause: there is then no direction to
+/// decompose the information along.
+#[test]
+fn a_mass_of_two_values_is_told_by_every_identifier() {
+    for name in IDENTIFIERS {
+        for truth in [0.0, 1.0] {
+            let mass = Parameter {
+                range: [0.0, 1.0],
+                ..Cart::mass(Scale::Binary([0.5, 2.0]))
+            };
+            pushed((mass, truth), 4.0, 0, 0.0, &mut |problem, real| {
+                let entry = find::<IdentifierEntry>(name).unwrap();
+                let identifier = (entry.make)(&(entry.defaults)()).unwrap();
+                let episodes = std::slice::from_ref(&real.episode);
+                let found = identifier.identify(problem, episodes).unwrap();
+                let probability = found.posterior.marginals[0].estimate;
+                assert!((probability - truth).abs() < 1e-3, "{name}: {probability}");
+                assert!(
+                    (0.5..1.7).contains(&found.residual),
+                    "{name}: {}",
+                    found.residual
+                );
+            });
+        }
+    }
 }
 
 #[test]

@@ -1,12 +1,19 @@
 //! Eigendecomposition of symmetric matrices that refuses non-finite entries.
 
-use nalgebra::{DMatrix, Dyn, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
 /// Eigenvalues and eigenvectors of a symmetric matrix.
 ///
-/// `None` where an entry is not finite: the iteration would never end.
+/// `None` where an entry is not finite: the iteration would never end. A matrix without entries has
+/// none of either.
 #[must_use]
 pub fn symmetric_eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    if matrix.is_empty() {
+        return Some(SymmetricEigen {
+            eigenvectors: matrix,
+            eigenvalues: DVector::zeros(0),
+        });
+    }
     matrix
         .iter()
         .all(|x| x.is_finite())

@@ -190,6 +190,9 @@ pub fn inverse_above_prior(total: &DMatrix<f64>) -> DMatrix<f64> {
     if total.iter().any(|x| !x.is_finite()) {
         return DMatrix::identity(n, n);
     }
+    if n == 0 {
+        return total.clone();
+    }
     let resolution = n as f64 * f64::EPSILON;
     if let Some(factor) = total.clone().cholesky() {
         let pivots = factor.l_dirty().diagonal().map(|p| p * p);

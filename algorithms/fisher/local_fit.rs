@@ -27,7 +27,8 @@
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::fisher::precision::{Precision, implied, inflation, informed};
+use crate::fisher::precision::{Precision, implied, informed};
+use crate::fisher::roughness::Roughness;
 use crate::fisher::symmetric_eigen;
 use asid_core::rng::Rng;
 
@@ -91,12 +92,13 @@ pub struct LocalFit {
     slopes: DMatrix<f64>,
     /// `(U^T U)^-1`.
     scatter: DMatrix<f64>,
-    /// Roughness of single simulations (regression residuals), rows x readings.
-    luck: DMatrix<f64>,
-    freedom: f64,
+    /// Roughness of single simulations.
+    roughness: Roughness,
     /// Residuals in the middle; corrected for the middle's own roughness where there are enough
     /// pairs.
     middle: DVector<f64>,
+    /// Covariance of these residuals by chance, as a share of that of the roughness.
+    middle_scatter: f64,
 }
 
 /// The information of readings about the entries of a point.
@@ -152,24 +154,27 @@ impl LocalFit {
         let features = 1 + n * (n + 1) / 2;
         let (mut luck, mut freedom) = ((&odd - &u * &slopes) * 0.5_f64.sqrt(), (pairs - n) as f64);
         let mut middle = DVector::from_column_slice(middle_row);
-        if pairs > features {
-            let (offset, left) = without_curvature(&(&u * 0.5), &even)?;
+        let middle_scatter = if pairs > features {
+            let (offset, left, share) = without_curvature(&(&u * 0.5), &even)?;
             middle += offset;
             luck = stacked(&luck, &(left * 2_f64.sqrt()));
             freedom += (pairs - features) as f64;
+            // A pair's mean has half the covariance of one simulation.
+            0.5 * share
         } else {
             // Second differences, whose scatter is that of one and a half simulations. They count
             // curvature as roughness.
             luck = stacked(&luck, &(even * 1.5_f64.sqrt().recip()));
             freedom += pairs as f64;
-        }
+            1.0
+        };
         Some(Self {
             factor: factor.clone(),
             slopes,
             scatter,
-            luck,
-            freedom,
+            roughness: Roughness::new(luck, freedom),
             middle,
+            middle_scatter,
         })
     }
 
@@ -178,7 +183,7 @@ impl LocalFit {
     pub fn first(&self, readings: usize) -> Self {
         Self {
             slopes: self.slopes.columns(0, readings).into_owned(),
-            luck: self.luck.columns(0, readings).into_owned(),
+            roughness: self.roughness.first(readings),
             middle: self.middle.rows(0, readings).into_owned(),
             ..self.clone()
         }
@@ -200,10 +205,19 @@ impl LocalFit {
             .unwrap_or_else(|| self.slopes.clone())
     }
 
-    /// Root mean square of the roughness over `readings` entries, in units of their noise.
+    /// The roughness of single simulations.
     #[must_use]
-    pub fn roughness(&self, readings: usize) -> f64 {
-        (self.luck.norm_squared() / self.freedom / readings.max(1) as f64).sqrt()
+    pub fn roughness(&self) -> &Roughness {
+        &self.roughness
+    }
+
+    /// Covariance by chance of the residuals that the fit predicts a step away from the middle, as
+    /// a share of that of the roughness. The slopes are those of differences of two simulations.
+    #[must_use]
+    pub fn scatter(&self, step: &DVector<f64>) -> f64 {
+        let along = self.factor.solve_lower_triangular(step);
+        let along = along.unwrap_or_else(|| step.clone());
+        self.middle_scatter + 2.0 * along.dot(&(&self.scatter * &along))
     }
 
     /// The information of the readings.
@@ -212,21 +226,14 @@ impl LocalFit {
     /// along the episode (`correlated`).
     #[must_use]
     pub fn told(&self, correlated: bool) -> Option<Told> {
-        let (precision, curvature, information);
-        if correlated {
-            precision = Precision::correlated(&self.luck, self.freedom);
-            curvature = self.curvature(&precision, &self.luck, self.freedom)?;
-            let [one, other] = self.halves();
-            let asked_of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
-                let by = Precision::correlated(weighing, self.freedom_of(weighing));
-                let h = self.curvature(&by, asked, self.freedom_of(asked))?;
-                self.sandwich(&by, &h, asked, self.freedom_of(asked))
-            };
-            information = (asked_of(&one, &other)? + asked_of(&other, &one)?) * 0.5;
-        } else {
-            precision = Precision::diagonal(&self.spread());
-            curvature = self.curvature(&precision, &self.luck, self.freedom)?;
-            information = self.sandwich(&precision, &curvature, &self.luck, self.freedom)?;
+        let precision = self.roughness.precision(correlated);
+        let curvature = self.curvature(&precision, &self.roughness)?;
+        let pairs = self.roughness.crossed(correlated);
+        let n = curvature.nrows();
+        let mut information = DMatrix::zeros(n, n);
+        for (by, asked) in &pairs {
+            let h = self.curvature(by, asked)?;
+            information += self.sandwich(by, &h, asked)? / pairs.len() as f64;
         }
         Some(Told {
             information: self.outside(&information)?,
@@ -239,47 +246,11 @@ impl LocalFit {
     #[must_use]
     pub fn emulated(&self, correlated: bool) -> Option<DMatrix<f64>> {
         let columns = self.slopes.transpose();
-        let (precision, lower, inflated);
-        if correlated {
-            precision = Precision::correlated(&self.luck, self.freedom);
-            lower = implied(&precision, &columns)?;
-            let [one, other] = self.halves();
-            let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
-                let by = Precision::correlated(weighing, self.freedom_of(weighing));
-                let factor = implied(&by, &columns)?;
-                inflation(&by, &columns, asked, self.freedom_of(asked), &factor)
-            };
-            inflated = (of(&one, &other)? + of(&other, &one)?) * 0.5;
-        } else {
-            precision = Precision::diagonal(&self.spread());
-            lower = implied(&precision, &columns)?;
-            inflated = inflation(&precision, &columns, &self.luck, self.freedom, &lower)?;
-        }
+        let precision = self.roughness.precision(correlated);
+        let lower = implied(&precision, &columns)?;
+        let inflated = self.roughness.inflation(&columns, correlated)?;
         let curvature = precision.weigh(&self.slopes) * columns;
         self.outside(&informed(&curvature, &lower, &inflated)?)
-    }
-
-    /// Variance of the roughness at each reading.
-    fn spread(&self) -> DVector<f64> {
-        DVector::from_fn(self.luck.ncols(), |k, _| {
-            self.luck.column(k).norm_squared() / self.freedom
-        })
-    }
-
-    /// The roughness rows in two interleaved halves, for cross-validation.
-    ///
-    /// A sample covariance cannot be tested on the rows that it was computed from, so each half is
-    /// evaluated with the covariance of the other.
-    fn halves(&self) -> [DMatrix<f64>; 2] {
-        [0, 1].map(|k| {
-            let rows: Vec<usize> = (k..self.luck.nrows()).step_by(2).collect();
-            self.luck.select_rows(&rows)
-        })
-    }
-
-    /// Degrees of freedom of some of the roughness rows.
-    fn freedom_of(&self, rows: &DMatrix<f64>) -> f64 {
-        self.freedom * rows.nrows() as f64 / self.luck.nrows() as f64
     }
 
     /// Transforms a quadratic form along the columns of the factor to the entries' own coordinates.
@@ -292,8 +263,8 @@ impl LocalFit {
 
     /// `J^T P J` along the columns of the factor, less what the scatter of the slopes adds to it;
     /// no eigenvalue is below zero.
-    fn curvature(&self, by: &Precision, luck: &DMatrix<f64>, freedom: f64) -> Option<DMatrix<f64>> {
-        let of_luck = by.weigh(luck).component_mul(luck).sum() / freedom;
+    fn curvature(&self, by: &Precision, luck: &Roughness) -> Option<DMatrix<f64>> {
+        let of_luck = luck.weighed_by(by);
         let raw =
             by.weigh(&self.slopes) * self.slopes.transpose() - &self.scatter * (2.0 * of_luck);
         let mut eigen = symmetric_eigen((&raw + raw.transpose()) * 0.5)?;
@@ -301,29 +272,23 @@ impl LocalFit {
         Some(eigen.recompose())
     }
 
-    /// `H M^-1 H`, with the covariance of the roughness taken from the rows of `luck`.
-    fn sandwich(
-        &self,
-        by: &Precision,
-        h: &DMatrix<f64>,
-        luck: &DMatrix<f64>,
-        freedom: f64,
-    ) -> Option<DMatrix<f64>> {
+    /// `H M^-1 H`, with the covariance of this roughness.
+    fn sandwich(&self, by: &Precision, h: &DMatrix<f64>, luck: &Roughness) -> Option<DMatrix<f64>> {
         let n = h.nrows();
         let weighed = by.weigh(&self.slopes);
-        let projected = &weighed * luck.transpose();
-        let middle = &weighed * weighed.transpose() + &projected * projected.transpose() / freedom;
+        let middle = &weighed * weighed.transpose() + luck.covariance_of(&weighed);
         let ridge = DMatrix::identity(n, n) * (1e-12 * middle.trace() + f64::MIN_POSITIVE);
         Some(h * (middle + ridge).cholesky()?.solve(h))
     }
 }
 
 /// Regresses `even` (pairs x readings) on a constant and the quadratic terms of the half steps `u`;
-/// returns the constant and the regression residuals.
+/// returns the constant, the regression residuals, and the variance of the constant as a share of
+/// that of a pair's mean.
 fn without_curvature(
     u: &DMatrix<f64>,
     even: &DMatrix<f64>,
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+) -> Option<(DVector<f64>, DMatrix<f64>, f64)> {
     let (pairs, n) = u.shape();
     let mut terms: Vec<DVector<f64>> = vec![DVector::repeat(pairs, 1.0)];
     for i in 0..n {
@@ -335,9 +300,10 @@ fn without_curvature(
     let f = phi.ncols();
     // Clipped points may leave a term undetermined: the ridge keeps it small.
     let ridge = DMatrix::identity(f, f) * (1e-9 * phi.norm_squared() / f as f64);
-    let normal = phi.transpose() * &phi + ridge;
-    let fitted = normal.cholesky()?.solve(&(phi.transpose() * even));
-    Some((fitted.row(0).transpose(), even - phi * fitted))
+    let factor = (phi.transpose() * &phi + ridge).cholesky()?;
+    let fitted = factor.solve(&(phi.transpose() * even));
+    let share = factor.inverse()[(0, 0)];
+    Some((fitted.row(0).transpose(), even - phi * fitted, share))
 }
 
 fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {

@@ -2,8 +2,8 @@
 //!
 //! - [`FisherBatch`] plays episodes with their information, as [`FisherSettings`] say.
 //! - [`Information`] sums it up and scores it.
-//! - [`local_fit`] fits the readings over a region, and [`precision`] weighs them by noise and
-//!   roughness.
+//! - [`local_fit`] fits the readings over a region, [`roughness`] is what it leaves, and
+//!   [`precision`] weighs the readings by noise and roughness.
 //! - [`inert`] finds unknowns that change no reading.
 
 mod batch;
@@ -12,6 +12,7 @@ pub mod inert;
 mod information;
 pub mod local_fit;
 pub mod precision;
+pub mod roughness;
 mod sensitivity;
 mod settings;
 

@@ -12,6 +12,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::fisher::roughness::Roughness;
 use crate::fisher::symmetric_eigen;
 
 /// Share of the roughness that is treated as independent from reading to reading; see the module.
@@ -68,7 +69,7 @@ impl Precision {
 
 /// Variance of an estimate over the one that the weights imply, along every direction at once.
 ///
-/// `b` are the slopes (readings x entries) and the rows of `epsilon` the roughness. The weights
+/// `b` are the slopes (readings x entries), and `R` is the covariance of the roughness. The weights
 /// give the curvature `H = b^T P b`, and the sandwich formula gives the covariance `H^-1 M H^-1`,
 /// with `M = b^T P (1 + R) P b`. Returned is `L^-1 M L^-T`, where `L L^T = H`: the covariance of
 /// `L^T x`, in which the implied one is the identity. `lower` is `L`, of [`implied`].
@@ -76,13 +77,11 @@ impl Precision {
 pub fn inflation(
     precision: &Precision,
     b: &DMatrix<f64>,
-    epsilon: &DMatrix<f64>,
-    freedom: f64,
+    roughness: &Roughness,
     lower: &DMatrix<f64>,
 ) -> Option<DMatrix<f64>> {
     let weighed = lower.solve_lower_triangular(&precision.weigh(&b.transpose()))?;
-    let projected = &weighed * epsilon.transpose();
-    Some(&weighed * weighed.transpose() + &projected * projected.transpose() / freedom)
+    Some(&weighed * weighed.transpose() + roughness.covariance_of(&weighed))
 }
 
 /// `X S^-1 X^T` for `X` of any rows x readings, without negative eigenvalues.
@@ -124,12 +123,12 @@ pub fn implied(precision: &Precision, b: &DMatrix<f64>) -> Option<DMatrix<f64>> 
 /// the curvature `L V^-1 L^T`, where `V` has the eigenvalues `v_i`. Each direction is widened by what
 /// *its* readings scatter, so that an unknown that smooth readings determine keeps its narrow
 /// interval beside one that rough readings determine (curvature adjustment: Ribatet, Cooley and
-/// Davison 2012).
+/// Davison 2012). Without any entry, `v` is 1.
 #[must_use]
 pub fn tempered(inflation: &DMatrix<f64>) -> Option<(f64, DMatrix<f64>)> {
     let eigen = symmetric_eigen((inflation + inflation.transpose()) * 0.5)?;
     let ratios = eigen.eigenvalues.map(|v| v.max(1.0));
-    let most = ratios.max();
+    let most = ratios.iter().copied().fold(1.0, f64::max);
     let further = DMatrix::from_diagonal(&ratios.map(|v| 1.0 / v - 1.0 / most));
     let axes = eigen.eigenvectors;
     Some((most, &axes * further * axes.transpose()))
@@ -157,6 +156,10 @@ fn scale_columns(x: &mut DMatrix<f64>, by: &DVector<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn rough(rows: &DMatrix<f64>, freedom: f64) -> Roughness {
+        Roughness::new(rows.clone(), freedom)
+    }
 
     #[test]
     fn it_is_the_inverse_of_the_covariance() {
@@ -196,7 +199,7 @@ mod tests {
         let epsilon = DMatrix::from_row_slice(2, 4, &[2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 3.0, 3.0]);
         let precision = Precision::diagonal(&DVector::from_vec(vec![0.5, 1.0, 1.0, 1.0]));
         let lower = implied(&precision, &b).unwrap();
-        let inflated = inflation(&precision, &b, &epsilon, 1.0, &lower).unwrap();
+        let inflated = inflation(&precision, &b, &rough(&epsilon, 1.0), &lower).unwrap();
         let p = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0 / 1.5, 0.5, 0.5, 0.5]));
         let h = b.transpose() * &p * &b;
         let information = informed(&h, &lower, &inflated).unwrap();
@@ -221,7 +224,7 @@ mod tests {
         let epsilon = DMatrix::from_fn(8, m, |i, k| [1.0, -1.0][i % 2] * b[(k, 0)]);
         let precision = Precision::diagonal(&DVector::repeat(m, 0.0));
         let lower = implied(&precision, &b).unwrap();
-        let inflated = inflation(&precision, &b, &epsilon, 8.0, &lower).unwrap();
+        let inflated = inflation(&precision, &b, &rough(&epsilon, 8.0), &lower).unwrap();
         let h = &lower * lower.transpose();
         let information = informed(&h, &lower, &inflated).unwrap();
         let along = |g: &DMatrix<f64>, by: [f64; 2]| {

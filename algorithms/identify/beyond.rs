@@ -6,7 +6,12 @@
 //! range. So the range is widened at that end and the episodes are identified again, until the
 //! posterior lies inside or the limit is reached. The result states the range that was finally
 //! searched.
+//!
+//! A wider range contains the narrower one, so the best fit in it is at least as good. A search that
+//! ends with a worse one was lost, and the previous answer stands. Two fits differ by chance too,
+//! since each averages over rough simulations; [`behind`] says how much of the difference counts.
 
+use super::evidence::{Evidence, behind};
 use asid_core::identify::Identified;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::posterior::Edge;
@@ -16,20 +21,34 @@ use asid_core::{Error, Problem, Result};
 /// searched for far away, where draws would be wasted.
 const STRIDE: f64 = 0.5;
 
+/// Nats by which the fit of a wider search may be behind that of the narrower one. Odds of 20 to 1
+/// are strong evidence (Kass and Raftery 1995, table on p. 777).
+const LOST: f64 = 3.0;
+
+/// How far a search goes, and how its fits are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// How far an end of a range moves at most, in widths of the prior's range (on its scale).
+    pub most: f64,
+    /// Whether readings are weighted by the whole covariance of the roughness.
+    pub correlated: bool,
+}
+
 /// Identifies within the prior's ranges, and in wider ranges while the posterior of an unknown
 /// piles up at an end.
 ///
-/// A range grows by at most `most` widths of the prior's range (on its scale). If a wider search
-/// fails, for example because no engine can simulate it, the previous answer stands.
+/// If a wider search fails, for example because no engine can simulate it, or is lost, the previous
+/// answer stands.
 ///
 /// # Errors
 /// Those of the first call of `identify`, and [`Error::Interrupted`].
 pub fn identify(
     problem: &Problem<'_>,
-    most: f64,
-    identify: impl Fn(&Problem<'_>) -> Result<Identified>,
+    limits: Limits,
+    identify: impl Fn(&Problem<'_>) -> Result<(Identified, Evidence)>,
 ) -> Result<Identified> {
-    let mut found = identify(problem)?;
+    let Limits { most, correlated } = limits;
+    let (mut found, mut evidence) = identify(problem)?;
     let mut piles = piles(&found);
     let mut parameters = problem.parameters.to_vec();
     let mut gone = 0.0;
@@ -48,15 +67,24 @@ pub fn identify(
             parameters: &parameters,
             ..problem.clone()
         };
-        let next = match identify(&wider) {
+        let (next, its_evidence) = match identify(&wider) {
             Ok(next) => next,
             Err(Error::Interrupted) => return Err(Error::Interrupted),
             Err(_) => break,
         };
+        if is_lost(&its_evidence, &evidence, correlated) {
+            break;
+        }
+        evidence = its_evidence;
         piles = self::piles(&next);
         found = merged(found, next, &parameters, problem.parameters);
     }
     Ok(found)
+}
+
+/// Whether a wider search ended with a worse fit than the narrower one, by more than chance.
+fn is_lost(wider: &Evidence, narrower: &Evidence, correlated: bool) -> bool {
+    behind(&[wider, narrower], correlated)[0] > LOST
 }
 
 /// The end of its range at which each unknown's posterior piles up, if any.
@@ -114,6 +142,8 @@ fn move_end(wide: &mut Parameter, prior: &Parameter, end: Edge, share: f64) -> b
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fisher::roughness::Roughness;
+    use nalgebra::DMatrix;
 
     fn parameter(range: [f64; 2], scale: Scale) -> Parameter {
         Parameter {
@@ -143,6 +173,35 @@ mod tests {
         );
         let log = moved([1.0, 100.0], Scale::Log, Edge::High).unwrap();
         assert!((log[1] - 1000.0).abs() < 1e-9);
+    }
+
+    /// Symptom: a search of the wider range that got lost replaced a better fit. Cause: any answer of a
+    /// wider range was taken for the better one.
+    #[test]
+    fn a_wider_search_that_is_lost_is_told_from_one_that_is_less_lucky() {
+        // 40 simulations, whose luck shifts all 200 readings together by 2 noises.
+        let (count, readings) = (40, 200);
+        let shift = |i: usize| if i % 2 == 0 { 2.0 } else { -2.0 };
+        let roughness = DMatrix::from_fn(count, readings, |i, _| shift(i));
+        let left = |residual: &dyn Fn(usize) -> f64| Evidence {
+            residual: (0..readings).map(residual).collect(),
+            present: readings,
+            roughness: Roughness::new(roughness.clone(), count as f64),
+            scatter: 0.1,
+            narrowing: 0.0,
+        };
+        let noise = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let narrower = left(&|k| 1.0 + noise(k));
+        // Half of the roughness away, all readings together.
+        let unlucky = left(&|k| 2.0 + noise(k));
+        // A slope along the episode, which no luck makes.
+        let lost = left(&|k| 1.0 + noise(k) + 4.0 * (k as f64 / 100.0 - 1.0));
+        for correlated in [false, true] {
+            assert!(!is_lost(&narrower, &narrower, correlated));
+            assert!(!is_lost(&unlucky, &narrower, correlated));
+            assert!(is_lost(&lost, &narrower, correlated));
+            assert!(!is_lost(&narrower, &lost, correlated));
+        }
     }
 
     #[test]

@@ -28,10 +28,12 @@
 //! Where the emulator does not explain the observation within noise and roughness, all is divided
 //! by the mismatch. Points are never selected by how well they fit, which would bias the result.
 
-use crate::fisher::precision::{Precision, implied, inflation, tempered, weighed_squares};
+use crate::fisher::precision::{implied, tempered, weighed_squares};
+use crate::fisher::roughness::Roughness;
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 
+use super::evidence::Evidence;
 use super::walk::Walk;
 use crate::optimise::Gaussian;
 
@@ -62,6 +64,12 @@ pub struct Emulator {
     widened: DMatrix<f64>,
     /// Best point within reach and in the box, standardised.
     best: DVector<f64>,
+    /// The emulated whitened residual at the best point.
+    left: DVector<f64>,
+    /// Covariance of that residual by the scatter of the simulations, as a share of that of the
+    /// roughness.
+    scatter: f64,
+    luck: Roughness,
     /// Root mean square of the emulated whitened residual at its best point.
     pub residual: f64,
     /// Root mean square of the roughness, in units of the sensors' noise.
@@ -126,7 +134,8 @@ impl Emulator {
         let n = region.mean().len();
         let f = features_len(n);
         let count = points.len();
-        if count < f + n {
+        // At least one more than there are features, so that the roughness has a degree of freedom.
+        if count < f + n.max(1) {
             return None;
         }
         let m = residuals[0].len();
@@ -137,31 +146,29 @@ impl Emulator {
         });
         let e = DMatrix::from_fn(count, m, |i, k| residuals[i][k]);
         let normal = phi.transpose() * &phi + DMatrix::identity(f, f) * (RIDGE * count as f64);
-        let a = normal.cholesky()?.solve(&(phi.transpose() * &e));
-        let epsilon = &e - &phi * &a;
-        let freedom = (count - f) as f64;
-        let spread: DVector<f64> =
-            DVector::from_fn(m, |k, _| epsilon.column(k).norm_squared() / freedom);
-        let precision = if correlated {
-            Precision::correlated(&epsilon, freedom)
-        } else {
-            Precision::diagonal(&spread)
-        };
+        let normal = normal.cholesky()?;
+        let a = normal.solve(&(phi.transpose() * &e));
+        let luck = Roughness::new(&e - &phi * &a, (count - f) as f64);
+        let precision = luck.precision(correlated);
         let gram = weighed_squares(&precision, &a);
         let mut emulator = Self {
             region: region.clone(),
             widened: gram.clone(),
             gram,
             best: DVector::zeros(n),
+            left: DVector::zeros(m),
+            scatter: 0.0,
             residual: 0.0,
-            roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
+            roughness: luck.size(readings),
             misfit: 0.0,
+            luck,
         };
         let best = emulator.minimum();
         let best_features = DVector::from_vec(features(&best));
         // Residual at the best point in units of the noise; the mismatch also counts the roughness.
-        let at_best = a.transpose() * &best_features;
-        let raw = at_best.norm_squared() / readings.max(1) as f64;
+        emulator.left = a.tr_mul(&best_features);
+        emulator.scatter = best_features.dot(&normal.solve(&best_features));
+        let raw = emulator.left.norm_squared() / readings.max(1) as f64;
         emulator.residual = raw.sqrt();
         let mismatch = 2.0 * emulator.loss_at(&best) / (readings as f64 - n as f64).max(1.0);
         emulator.misfit = mismatch.max(0.0).sqrt();
@@ -173,24 +180,7 @@ impl Emulator {
             move |i, k| slopes[k][i]
         });
         let lower = implied(&precision, &b)?;
-        let inflated = if correlated {
-            // A sample covariance cannot be tested on the points that it was computed from: each
-            // half is evaluated with the covariance of the other.
-            let share = freedom / count as f64;
-            let half = |k: usize| {
-                let rows: Vec<usize> = (k..count).step_by(2).collect();
-                epsilon.select_rows(&rows)
-            };
-            let halves = [half(0), half(1)];
-            let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
-                let by = Precision::correlated(weighing, share * weighing.nrows() as f64);
-                let freedom = share * asked.nrows() as f64;
-                inflation(&by, &b, asked, freedom, &implied(&by, &b)?)
-            };
-            (of(&halves[0], &halves[1])? + of(&halves[1], &halves[0])?) * 0.5
-        } else {
-            inflation(&precision, &b, &epsilon, freedom, &lower)?
-        };
+        let inflated = emulator.luck.inflation(&b, correlated)?;
         let (most, further) = tempered(&inflated)?;
         let moved = precision.weigh(&b.transpose()) * a.transpose();
         let moved = lower.solve_lower_triangular(&moved)?;
@@ -217,6 +207,9 @@ impl Emulator {
     /// keeps its place.
     fn minimum(&self) -> Vec<f64> {
         let n = self.region.mean().len();
+        if n == 0 {
+            return Vec::new();
+        }
         let (low, high) = self.region.bounds();
         // Columns `du / dx_j`.
         let columns: Vec<DVector<f64>> = (0..n)
@@ -309,6 +302,21 @@ impl Emulator {
             share *= 2.0;
         }
         u
+    }
+
+    /// What is left of the readings at the best point, for a comparison with other models.
+    ///
+    /// `present` readings are there, and `narrowing` is the sum of the logarithms of posterior over
+    /// prior standard deviations.
+    #[must_use]
+    pub fn evidence(&self, present: usize, narrowing: f64) -> Evidence {
+        Evidence {
+            residual: self.left.as_slice().to_vec(),
+            present,
+            roughness: self.luck.clone(),
+            scatter: self.scatter,
+            narrowing,
+        }
     }
 
     /// The best point of the search space.

@@ -18,8 +18,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
 use super::beyond;
+use super::evidence::Evidence;
 use super::models;
-use super::sampling::{self, Evidence};
+use super::sampling;
 use super::walk::{self, Walk};
 use crate::optimise::GaussNewtonSettings;
 use crate::optimise::gauss_newton::{Fit, Space, minimise};
@@ -84,9 +85,11 @@ asid_core::register!(IdentifierEntry {
 
 impl Identifier for GaussNewtonIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        beyond::identify(problem, self.beyond, |problem| {
-            self.within(problem, episodes)
-        })
+        let limits = beyond::Limits {
+            most: self.beyond,
+            correlated: self.gauss_newton.correlated,
+        };
+        beyond::identify(problem, limits, |problem| self.within(problem, episodes))
     }
 
     fn assumes(&self) -> Assumptions {
@@ -101,7 +104,11 @@ impl Identifier for GaussNewtonIdentifier {
 
 impl GaussNewtonIdentifier {
     /// Identifies within the ranges of the problem's unknowns.
-    fn within(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+    fn within(
+        &self,
+        problem: &Problem<'_>,
+        episodes: &[Episode],
+    ) -> Result<(Identified, Evidence)> {
         let starts = problem.task.exploration().start.len() * episodes.len();
         let settings = &self.gauss_newton;
         let size = settings.batch(problem.parameters.len() + starts);
@@ -119,7 +126,7 @@ impl GaussNewtonIdentifier {
             let message = "nearly every simulation of the episode diverged";
             return Err(Error::Failed(message.into()));
         }
-        models::average(problem.parameters, found, likelihood.present())
+        models::average(problem.parameters, found, settings.correlated)
     }
 
     /// Fits one model; `None` where nearly every simulation diverged.
@@ -153,7 +160,10 @@ impl GaussNewtonIdentifier {
         let values: Vec<Vec<f64>> = drawn.iter().map(|z| likelihood.parameters(z)).collect();
         let narrowing = (0..sought).map(|i| walk::deviation(&drawn, i).clamp(1e-9, 1.0).ln());
         let evidence = Evidence {
-            loss: 0.5 * fit.residual.powi(2) * space.readings as f64,
+            residual: fit.left.as_slice().to_vec(),
+            present: space.readings,
+            roughness: fit.luck.clone(),
+            scatter: fit.scatter,
             narrowing: narrowing.sum(),
         };
         let names: Vec<&str> = likelihood.names();
@@ -166,7 +176,7 @@ impl GaussNewtonIdentifier {
             .chain([sampling::summary(
                 likelihood,
                 &drawn,
-                fit.course.last().map_or(evidence.loss, |c| c.0),
+                fit.course.last().map_or(fit.loss(), |c| c.0),
             )])
             .collect();
         let identified = Identified {
@@ -276,20 +286,27 @@ impl Seen {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fisher::roughness::Roughness;
     use asid_core::Streams;
 
     fn seen(point: &[f64], information: &[f64]) -> Seen {
+        Seen::new(&fit_at(point, information), point.len())
+    }
+
+    fn fit_at(point: &[f64], information: &[f64]) -> Fit {
         let n = point.len();
-        let fit = Fit {
+        Fit {
             point: point.iter().map(|x| x.clamp(-1.7, 1.7)).collect(),
             free: point.to_vec(),
             information: DMatrix::from_row_slice(n, n, information),
+            left: DVector::zeros(0),
+            luck: Roughness::none(0),
+            scatter: 0.0,
             residual: 1.0,
             misfit: 1.0,
             roughness: 0.0,
             course: Vec::new(),
-        };
-        Seen::new(&fit, n)
+        }
     }
 
     #[test]
@@ -312,6 +329,19 @@ mod tests {
             .collect();
         assert!((walk::deviation(&across, 0) - 0.1).abs() < 0.02);
         assert!(walk::deviation(&across, 1) > 1.5);
+    }
+
+    /// Symptom: `gauss-newton` panicked where every unknown is binary. Cause: a matrix without entries
+    /// has no eigenvalues.
+    #[test]
+    fn without_a_continuous_unknown_every_draw_is_the_only_point() {
+        let found = seen(&[], &[]);
+        assert!(found.unseen(&[]).is_empty());
+        let drawn = found.sample(3, &mut Streams::new(0).stream("t"));
+        assert_eq!(drawn, vec![Vec::<f64>::new(); 3]);
+        // A start pose that is estimated jointly is no unknown.
+        let fit = fit_at(&[0.5], &[4.0]);
+        assert!(Seen::new(&fit, 0).information.is_empty());
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod beyond;
 pub mod cem;
 pub mod cma_es;
 pub mod emulator;
+pub mod evidence;
 pub mod expected;
 pub mod gauss_newton;
 pub mod likelihood;

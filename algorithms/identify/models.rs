@@ -1,15 +1,13 @@
 //! Binary unknowns: one model per combination of their values, each fitted separately, and the
 //! probability of each.
 //!
-//! The evidence of a model is `exp(-loss / c)` at its best point times the share of the prior that
-//! its posterior takes (Laplace's approximation, per unknown). `c`, at least 1, is the misfit of
-//! the best model relative to the sensors' noise. A misfit that no model explains then supports
-//! none of them.
+//! The evidence of a model is `exp(-b)` times the share of the prior that its posterior takes
+//! (Laplace's approximation, per unknown), where `b` is what its fit is [`behind`] the best in nats.
 
 use asid_core::identify::Identified;
 use asid_core::{Error, Parameter, Posterior, Result};
 
-use super::sampling::Evidence;
+use super::evidence::{Evidence, behind};
 
 /// Largest number of binary unknowns: each doubles the number of models to fit.
 const MAX_BINARY: usize = 5;
@@ -45,51 +43,31 @@ pub fn all(parameters: &[Parameter]) -> Result<Vec<Vec<Option<f64>>>> {
         .collect())
 }
 
-/// Scale of loss differences between models.
-#[derive(Clone, Copy, Debug)]
-pub struct Scale {
-    best: f64,
-    mismatch: f64,
+/// Whether a model is too far behind another to be considered further, by the residual of its best
+/// simulation; see [`behind`] for `correlated`.
+#[must_use]
+pub fn is_hopeless(single: &[f64], other: &Evidence, correlated: bool) -> bool {
+    let single = Evidence::of_single(single.to_vec(), other);
+    behind(&[&single, other], correlated)[0] > HOPELESS
 }
 
-impl Scale {
-    /// Scale from the losses of all models and the number of reading entries that are present.
-    #[must_use]
-    pub fn new(losses: impl Iterator<Item = f64>, present: usize) -> Self {
-        let best = losses.fold(f64::INFINITY, f64::min);
-        Self {
-            best,
-            mismatch: (2.0 * best / present.max(1) as f64).max(1.0),
-        }
-    }
-
-    /// Nats by which a model is behind the best.
-    fn behind(self, loss: f64) -> f64 {
-        (loss - self.best) / self.mismatch
-    }
-
-    /// Whether a model is too far behind to be considered further.
-    #[must_use]
-    pub fn is_hopeless(self, loss: f64) -> bool {
-        self.behind(loss) > HOPELESS
-    }
-}
-
-/// The posterior over all models, each weighted by its probability; all else is that of the most
-/// probable model.
+/// The posterior over all models, each weighted by its probability; all else, the evidence too, is
+/// that of the most probable model. See [`behind`] for `correlated`.
 ///
 /// # Errors
 /// When there is no model.
 pub fn average(
     parameters: &[Parameter],
     mut found: Vec<(Identified, Evidence)>,
-    present: usize,
-) -> Result<Identified> {
+    correlated: bool,
+) -> Result<(Identified, Evidence)> {
     if found.len() > 1 {
-        let scale = Scale::new(found.iter().map(|f| f.1.loss), present);
-        let mut log_evidence: Vec<f64> = found
+        let models: Vec<&Evidence> = found.iter().map(|(_, evidence)| evidence).collect();
+        let behind = behind(&models, correlated);
+        let mut log_evidence: Vec<f64> = models
             .iter()
-            .map(|(_, e)| e.narrowing - scale.behind(e.loss))
+            .zip(behind)
+            .map(|(model, behind)| model.narrowing - behind)
             .collect();
         let top = log_evidence.iter().copied().fold(f64::MIN, f64::max);
         for x in &mut log_evidence {
@@ -113,13 +91,13 @@ pub fn average(
     }
     found
         .pop()
-        .map(|(identified, _)| identified)
         .ok_or_else(|| Error::Failed("no model explains the episode".into()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fisher::roughness::Roughness;
     use asid_core::parameter::Scale as Prior;
 
     fn parameters() -> Vec<Parameter> {
@@ -134,6 +112,7 @@ mod tests {
             .into()
     }
 
+    /// A model without roughness, with this loss over 50 readings.
     fn model(value: f64, loss: f64, narrowing: f64) -> (Identified, Evidence) {
         let samples = vec![vec![value, 0.5]; 10];
         let identified = Identified {
@@ -144,7 +123,18 @@ mod tests {
             misfit: Some(1.0),
             roughness: 0.0,
         };
-        (identified, Evidence { loss, narrowing })
+        let evidence = Evidence {
+            residual: vec![(2.0 * loss / 50.0).sqrt(); 50],
+            present: 50,
+            roughness: Roughness::none(50),
+            scatter: 0.0,
+            narrowing,
+        };
+        (identified, evidence)
+    }
+
+    fn averaged(found: Vec<(Identified, Evidence)>) -> Identified {
+        average(&parameters(), found, false).unwrap().0
     }
 
     #[test]
@@ -157,17 +147,20 @@ mod tests {
     #[test]
     fn the_probability_is_the_ratio_of_the_evidences() {
         // 50 readings at noise level: a loss of 25; the other model is ln 3 behind.
-        let found = vec![model(0.0, 25.0 + 3.0_f64.ln(), 0.0), model(1.0, 25.0, 0.0)];
-        let identified = average(&parameters(), found, 50).unwrap();
+        let identified = averaged(vec![
+            model(0.0, 25.0 + 3.0_f64.ln(), 0.0),
+            model(1.0, 25.0, 0.0),
+        ]);
         assert!((identified.posterior.marginals[0].estimate - 0.75).abs() < 1e-9);
         assert_eq!(identified.starts, vec![vec![1.0]]);
         // A model is penalised for the unknowns that it had to find.
-        let found = vec![model(0.0, 25.0, 0.0), model(1.0, 25.0, -(4.0_f64.ln()))];
-        let identified = average(&parameters(), found, 50).unwrap();
+        let identified = averaged(vec![
+            model(0.0, 25.0, 0.0),
+            model(1.0, 25.0, -(4.0_f64.ln())),
+        ]);
         assert!((identified.posterior.marginals[0].estimate - 0.2).abs() < 1e-9);
         // With misfit that no model explains (4 times the loss), differences count for less.
-        let found = vec![model(0.0, 104.0, 0.0), model(1.0, 100.0, 0.0)];
-        let identified = average(&parameters(), found, 50).unwrap();
+        let identified = averaged(vec![model(0.0, 104.0, 0.0), model(1.0, 100.0, 0.0)]);
         let wanted = 1.0 / (1.0 + (-1.0_f64).exp());
         assert!((identified.posterior.marginals[0].estimate - wanted).abs() < 1e-9);
     }

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
 use super::emulator::{Emulator, REACH, features_len};
+use super::evidence::Evidence;
 use crate::optimise::{Gaussian, require};
 
 /// Offset of a posterior's mean from the region's middle, in standard deviations of the region
@@ -137,6 +138,14 @@ impl Samples {
         self.losses.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
+    /// The residual of the point with the smallest loss; `None` where every simulation diverged.
+    #[must_use]
+    pub fn best_residual(&self) -> Option<&[f64]> {
+        let best =
+            (0..self.losses.len()).min_by(|&i, &j| self.losses[i].total_cmp(&self.losses[j]));
+        best.map(|i| &*self.residuals[i])
+    }
+
     /// Fit to the `count` best points, weighted by rank so that no single lucky point dominates.
     fn elite(&self, count: usize, low: &[f64], high: &[f64]) -> Result<Gaussian> {
         let mut order: Vec<usize> = (0..self.losses.len()).collect();
@@ -185,17 +194,6 @@ fn next_region(region: &Gaussian, posterior: &Gaussian, widen: f64) -> (Gaussian
     let cut = (REACH / 3.0_f64.sqrt() / widen).sqrt();
     let settled = region.widest_axis(posterior) <= cut;
     (posterior.widened(widen), settled)
-}
-
-/// Evidence for a model.
-#[derive(Clone, Copy, Debug)]
-pub struct Evidence {
-    /// Half the sum of squared residuals at the emulator's best point. The best single draw is
-    /// partly luck, which would favour one of two models that no reading distinguishes.
-    pub loss: f64,
-    /// Sum of the logarithms of posterior over prior standard deviations: the penalty for unknowns
-    /// that had to be found.
-    pub narrowing: f64,
 }
 
 /// Runs rounds of draws after a search; returns the posterior and its evidence.
@@ -263,10 +261,7 @@ pub fn posterior(
         let variance = column.map(|z| (z - mean).powi(2)).sum::<f64>() / drawn.len() as f64;
         variance.sqrt().clamp(1e-9, 1.0).ln()
     });
-    let evidence = Evidence {
-        loss: 0.5 * emulator.residual.powi(2) * likelihood.present() as f64,
-        narrowing: widths.sum(),
-    };
+    let evidence = emulator.evidence(likelihood.present(), widths.sum());
     let identified = Identified {
         posterior: Posterior::from_samples(problem.parameters, values, &vec![1.0; drawn.len()]),
         starts: (0..likelihood.episodes())

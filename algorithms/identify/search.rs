@@ -7,6 +7,7 @@ use asid_core::{Episode, Error, Problem, Result};
 
 use super::Likelihood;
 use super::beyond;
+use super::evidence::Evidence;
 use super::models;
 use super::sampling::{self, Samples, SamplingSettings};
 use crate::optimise::{Search, UpdateRule};
@@ -98,17 +99,23 @@ impl<R: UpdateRule> Course<'_, R> {
     /// # Errors
     /// When the engine fails or nearly every simulation diverged.
     pub fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        beyond::identify(problem, self.sampling.beyond, |problem| {
-            self.within(problem, episodes)
-        })
+        let limits = beyond::Limits {
+            most: self.sampling.beyond,
+            correlated: self.sampling.correlated,
+        };
+        beyond::identify(problem, limits, |problem| self.within(problem, episodes))
     }
 
     /// Identifies within the ranges of the problem's unknowns.
     ///
     /// A search whose misfit exceeds [`LOST`] restarts with more draws, as in IPOP-CMA-ES (Auger
     /// and Hansen 2005); the fit with the smallest misfit stands.
-    fn within(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        let mut best = self.once(problem, episodes, 0)?;
+    fn within(
+        &self,
+        problem: &Problem<'_>,
+        episodes: &[Episode],
+    ) -> Result<(Identified, Evidence)> {
+        let (mut best, mut evidence) = self.once(problem, episodes, 0)?;
         for restart in 1..=self.budget.restarts {
             // At an end of a range the range itself causes the misfit.
             let marginals = &best.posterior.marginals;
@@ -116,16 +123,16 @@ impl<R: UpdateRule> Course<'_, R> {
             if !lost || marginals.iter().any(|m| m.at_edge.is_some()) {
                 break;
             }
-            let mut next = self.once(problem, episodes, restart)?;
+            let (mut next, its_evidence) = self.once(problem, episodes, restart)?;
             let before = std::mem::take(&mut best.iterations);
             next.iterations.splice(0..0, before);
             if next.misfit < best.misfit {
-                best = next;
+                (best, evidence) = (next, its_evidence);
             } else {
                 best.iterations = next.iterations;
             }
         }
-        Ok(best)
+        Ok((best, evidence))
     }
 
     /// One search with `2^restart` times the population, on random streams of its own.
@@ -134,7 +141,7 @@ impl<R: UpdateRule> Course<'_, R> {
         problem: &Problem<'_>,
         episodes: &[Episode],
         restart: usize,
-    ) -> Result<Identified> {
+    ) -> Result<(Identified, Evidence)> {
         let (budget, settings) = (self.budget, self.sampling);
         let population = budget.population << restart;
         let size = population.max(settings.draws);
@@ -164,13 +171,16 @@ impl<R: UpdateRule> Course<'_, R> {
             }
             searched.push((model, samples, iterations, rng));
         }
-        let scale = models::Scale::new(
-            searched.iter().map(|s| s.1.best_loss()),
-            likelihood.present(),
-        );
-        let mut found = Vec::with_capacity(searched.len());
+        // The best model's roughness says by how much another one is behind.
+        searched.sort_by(|a, b| a.1.best_loss().total_cmp(&b.1.best_loss()));
+        let mut found: Vec<(Identified, Evidence)> = Vec::with_capacity(searched.len());
         for (model, samples, iterations, mut rng) in searched {
-            if scale.is_hopeless(samples.best_loss()) {
+            let hopeless = found.first().is_some_and(|(_, best)| {
+                samples
+                    .best_residual()
+                    .is_none_or(|single| models::is_hopeless(single, best, settings.correlated))
+            });
+            if hopeless {
                 problem.progress.advance(settings.rounds as u64);
                 continue;
             }
@@ -185,7 +195,7 @@ impl<R: UpdateRule> Course<'_, R> {
             )?);
         }
         problem.progress.end();
-        models::average(problem.parameters, found, likelihood.present())
+        models::average(problem.parameters, found, settings.correlated)
     }
 }
 

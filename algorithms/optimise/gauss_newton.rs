@@ -11,6 +11,7 @@
 
 use crate::fisher::inverse_above_prior;
 use crate::fisher::local_fit::{LocalFit, Told, design, sets};
+use crate::fisher::roughness::Roughness;
 use asid_core::Result;
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
@@ -137,6 +138,12 @@ pub struct Fit {
     /// Information about the entries, without any prior. It accounts for the roughness, its
     /// correlation and the remaining misfit.
     pub information: DMatrix<f64>,
+    /// Residuals at the point, by the linear model.
+    pub left: DVector<f64>,
+    /// Roughness of single simulations about the point.
+    pub luck: Roughness,
+    /// Covariance of these residuals by chance, as a share of that of the roughness.
+    pub scatter: f64,
     /// Root mean square of the residuals at the point, by the linear model.
     pub residual: f64,
     /// Root mean square of the residuals at the point, in units of noise and roughness together.
@@ -148,6 +155,12 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Half the sum of squared residuals.
+    #[must_use]
+    pub fn loss(&self) -> f64 {
+        0.5 * self.left.norm_squared()
+    }
+
     /// Information about the `sought` leading entries, with the others projected out.
     #[must_use]
     pub fn about(&self, sought: usize) -> DMatrix<f64> {
@@ -198,7 +211,35 @@ pub fn minimise(
     else {
         return Ok(None);
     };
+    if space.low.is_empty() {
+        return at_the_only_point(residuals, space, course);
+    }
     settle(settings, residuals, space, best, course, rng, tick)
+}
+
+/// The fit in a space without entries: there is nothing to move, and no roughness is measured.
+fn at_the_only_point(
+    residuals: &mut Residuals<'_>,
+    space: Space<'_>,
+    course: Vec<(f64, Vec<Vec<f64>>)>,
+) -> Result<Option<Fit>> {
+    let row = residuals(&[Vec::new()])?.pop().flatten();
+    Ok(row.map(|row| {
+        let left = DVector::from_vec(row);
+        let residual = (left.norm_squared() / space.readings.max(1) as f64).sqrt();
+        Fit {
+            point: Vec::new(),
+            free: Vec::new(),
+            information: DMatrix::zeros(0, 0),
+            luck: Roughness::none(left.len()),
+            left,
+            scatter: 0.0,
+            residual,
+            misfit: residual,
+            roughness: 0.0,
+            course,
+        }
+    }))
 }
 
 fn half_squares(row: &[f64]) -> f64 {
@@ -269,7 +310,7 @@ fn settle(
         let (next, whole) = moved(&fit, &told, &point, &factor, space);
         // Residuals after the step, by the linear model.
         let step = DVector::from_fn(n, |i, _| next[i] - point[i]);
-        let left = fit.middle() + fit.slopes().transpose() * step;
+        let left = fit.middle() + fit.slopes().tr_mul(&step);
         let row = DMatrix::from_row_slice(1, left.len(), left.as_slice());
         let weighted = told.precision.weigh(&row).component_mul(&row).sum();
         let spare = (space.readings as f64 - n as f64).max(1.0);
@@ -281,9 +322,12 @@ fn settle(
             point: next,
             free: whole,
             information,
+            scatter: fit.scatter(&step),
+            luck: fit.roughness().clone(),
             residual: (left.norm_squared() / space.readings.max(1) as f64).sqrt(),
             misfit: mismatch.max(0.0).sqrt(),
-            roughness: fit.roughness(space.readings),
+            roughness: fit.roughness().size(space.readings),
+            left,
             course: Vec::new(),
         });
         let Some(root) = covariance.cholesky() else {

@@ -49,7 +49,7 @@ fn a_quadratic_is_fitted_exactly() {
     // Slopes at (0.5, 1): (2 + 1, 0, 1) and (-1 + 0.5, 2, 0).
     let wanted = DMatrix::from_row_slice(2, 3, &[3.0, 0.0, 1.0, -0.5, 2.0, 0.0]);
     assert!((fit.slopes() - &wanted).norm() < 1e-9);
-    assert!(fit.roughness(3) < 1e-6);
+    assert!(fit.roughness().size(3) < 1e-6);
     for correlated in [false, true] {
         let told = fit.told(correlated).unwrap();
         let error = told.information - &wanted * wanted.transpose();

@@ -275,6 +275,31 @@ fn a_minimum_outside_of_the_box_leaves_walkers_that_move() {
     assert!((b / 0.13 - 1.0).abs() < 0.2, "{b}");
 }
 
+/// Symptom: a task whose unknowns are all binary and whose start is fixed ended in a panic. Cause:
+/// matrices without entries have no largest eigenvalue, and no column to be made of.
+#[test]
+fn a_space_without_entries_has_one_point_and_its_roughness() {
+    let region = about(&[]);
+    let points = vec![Vec::new(); 40];
+    // Two models of the ensemble, one above and one below the reading of 1 by 2.
+    let residuals: Vec<Vec<f64>> = (0..40)
+        .map(|i| vec![if i % 2 == 0 { 3.0 } else { -1.0 }; 10])
+        .collect();
+    for correlated in [false, true] {
+        let emulator = fit(&region, &points, &residuals, correlated);
+        assert!(emulator.best().is_empty());
+        assert!((emulator.residual - 1.0).abs() < 1e-4);
+        // 40 simulations less one feature.
+        let wanted = 2.0 * (40.0_f64 / 39.0).sqrt();
+        assert!((emulator.roughness - wanted).abs() < 1e-4);
+        let drawn = emulator.sample(5, &mut Streams::new(0).stream("w"));
+        assert_eq!(drawn, vec![Vec::<f64>::new(); 5]);
+        let evidence = emulator.evidence(10, 0.0);
+        // The mean of 40 simulations.
+        assert!((evidence.scatter - 1.0 / 40.0).abs() < 1e-4);
+    }
+}
+
 #[test]
 fn slopes_are_derivatives_of_features() {
     let u = [0.3, -0.7, 1.1];

@@ -297,3 +297,17 @@ fn the_middle_of_a_box_is_among_the_first_points() {
     assert_eq!(first.len(), settings.screened);
     assert!(first.contains(&vec![1.1, -1.0]), "{first:?}");
 }
+
+/// Symptom: where every unknown is binary and the start is fixed, `gauss-newton` said that nearly every
+/// simulation diverged. Cause: it fitted slopes to no entry.
+#[test]
+fn a_space_without_entries_is_fitted_by_its_only_point() {
+    let fit = found(
+        &GaussNewtonSettings::default(),
+        space(&[], &[], 0),
+        0,
+        |_| vec![2.0; READINGS],
+    );
+    assert!(fit.point.is_empty() && fit.roughness == 0.0);
+    assert!((fit.residual - 2.0).abs() < 1e-12 && (fit.misfit - 2.0).abs() < 1e-12);
+}
