@@ -151,7 +151,7 @@ impl<'a> SimulatedWorld<'a> {
         self.batch.place(self.task, &[WORLD], start)
     }
 
-    /// Turns an engine's refusal of a parameter into an error about the requested truth.
+    /// An engine's refusal of a parameter as an error about the unknown and its true value.
     fn of_truth(&self, error: Error) -> Error {
         let Error::Parameter { parameter, message } = error else {
             return error;
@@ -160,9 +160,12 @@ impl<'a> SimulatedWorld<'a> {
             p.name == parameter || p.targets.iter().any(|t| t.to_string() == parameter)
         };
         match self.parameters.iter().position(own) {
-            Some(i) => Error::Config {
-                key: format!("--truth {}", self.parameters[i].name),
-                message,
+            Some(i) => Error::Parameter {
+                parameter: self.parameters[i].name.clone(),
+                message: format!(
+                    "the real world cannot have its true value of {}: {message}",
+                    self.truth[i]
+                ),
             },
             None => Error::Parameter { parameter, message },
         }

@@ -105,6 +105,19 @@ impl Error {
         !matches!(self, Self::Failed(_) | Self::Shape(_) | Self::Interrupted)
     }
 
+    /// Whether something lacks that no run can do without: a registered item, a part of the build, an
+    /// ability of the engine, or a plugin. Whatever else differs between runs, all of them fail.
+    #[must_use]
+    pub fn is_lack(&self) -> bool {
+        matches!(
+            self,
+            Self::UnknownName { .. }
+                | Self::Missing { .. }
+                | Self::Incapable { .. }
+                | Self::Plugin { .. }
+        )
+    }
+
     /// An error of kind [`Error::UnknownName`], with similar names.
     #[must_use]
     pub fn unknown<'a>(

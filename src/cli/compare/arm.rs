@@ -1,5 +1,7 @@
 //! An arm: one method on one task, in one world, on one engine. Its runs share their settings.
 
+use std::path::Path;
+
 use anyhow::Result;
 use asid_comparison::cell::CellKey;
 use asid_comparison::document::Document;
@@ -78,6 +80,25 @@ impl Arm {
             hash,
             canonical,
         })
+    }
+}
+
+impl Arm {
+    /// Whether its settings name this file, so that all of its runs need it.
+    pub fn names(&self, path: &Path) -> bool {
+        fn holds(value: &toml::Value, path: &Path) -> bool {
+            match value {
+                toml::Value::String(text) => Path::new(text) == path,
+                toml::Value::Array(all) => all.iter().any(|value| holds(value, path)),
+                toml::Value::Table(table) => table.values().any(|value| holds(value, path)),
+                _ => false,
+            }
+        }
+        let set = self.common.set.iter();
+        let mut set = set.filter_map(|line| line.parse::<toml::Table>().ok());
+        let base = self.common.base.values();
+        base.into_iter().any(|value| holds(value, path))
+            || set.any(|table| table.values().any(|value| holds(value, path)))
     }
 }
 
@@ -258,6 +279,24 @@ mod tests {
             settings["identifier"]["network"].as_str(),
             Some("a.safetensors")
         );
+    }
+
+    #[test]
+    fn an_arm_names_the_files_of_its_settings() {
+        let arm = |base: &str, set: &[&str]| Arm {
+            method: Method::named("asid").unwrap(),
+            common: Common {
+                base: base.parse().unwrap(),
+                set: set.iter().map(|line| (*line).to_owned()).collect(),
+                ..Common::default()
+            },
+            hash: String::new(),
+            canonical: String::new(),
+        };
+        let file = Path::new("a/policy.safetensors");
+        assert!(arm("[explorer]\npolicy = 'a/policy.safetensors'", &[]).names(file));
+        assert!(arm("", &["explorer.policy=\"a/policy.safetensors\""]).names(file));
+        assert!(!arm("[explorer]\nname = 'policy'", &["seed=3"]).names(file));
     }
 
     #[test]

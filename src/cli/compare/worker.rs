@@ -99,11 +99,25 @@ impl<'w> Worker<'w> {
         }
     }
 
-    /// Records why a cell failed. A wrong call in an arm's first cell is wrong for all.
+    /// Whether every cell of an arm fails by this error. A cell has its own truth, its own real world
+    /// and its own condition: what an engine or a setting refuses of these says nothing about others.
+    fn holds_for_all(&self, key: &CellKey, error: &anyhow::Error) -> bool {
+        match error.downcast_ref::<Error>() {
+            Some(Error::File { path, .. }) => match self.arms.get(&arm_name(key)) {
+                Some(Ok(arm)) => arm.names(path),
+                _ => false,
+            },
+            Some(error) => error.is_lack(),
+            None => false,
+        }
+    }
+
+    /// Records why a cell failed. What all cells of its arm lack rules the arm out, unless one of them
+    /// has a result.
     fn failed(&self, key: &CellKey, error: anyhow::Error) -> asid_core::Result<()> {
-        let usage = error.downcast_ref::<Error>().is_some_and(Error::is_usage);
         let mut mates = self.keys.iter().filter(|k| k.arm_mate(key));
-        let of_all = usage && !mates.any(|k| self.store.place(k).is_file());
+        let of_all =
+            self.holds_for_all(key, &error) && !mates.any(|k| self.store.place(k).is_file());
         let reason = match self.arms.get(&arm_name(key)) {
             Some(Err(why)) => why.clone(),
             _ => format!("{error:#}"),
@@ -138,6 +152,64 @@ impl<'w> Worker<'w> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Symptom: an engine that refused the truth of one seed left a method out of the table, and the
+    /// number of threads decided which of its runs were lost. Cause: every wrong call in the first run
+    /// of a method counted as one of all.
+    #[test]
+    fn what_one_run_cannot_have_rules_out_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = |method: &str, seed| CellKey {
+            task: "t".into(),
+            condition: "c".into(),
+            method: method.into(),
+            world: "matched".into(),
+            backend: "b".into(),
+            seed,
+        };
+        let text = |x: &str| x.to_owned();
+        let truth = Error::Parameter {
+            parameter: text("mass"),
+            message: text("must be above 0"),
+        };
+        let scene = Error::Scene {
+            scene: text("perturbed"),
+            message: text("two geoms overlap"),
+        };
+        let lost = Error::File {
+            path: "/tmp/log.csv".into(),
+            message: text("gone"),
+        };
+        let setting = Error::Config {
+            key: text("condition"),
+            message: text("has no such range"),
+        };
+        let network = Error::Missing {
+            what: text("a network"),
+            message: text("none ships"),
+        };
+        let engine = Error::Incapable {
+            backend: text("b"),
+            what: text("weld"),
+        };
+        for (error, of_all) in [
+            (truth, false),
+            (scene, false),
+            (lost, false),
+            (setting, false),
+            (network, true),
+            (engine, true),
+        ] {
+            let method = error.to_string();
+            let keys = [key(&method, 0), key(&method, 1)];
+            let (store, arms) = (Store::new(folder.path()), Arms::new());
+            let worker = Worker::new(&store, &arms, &keys, true, 2);
+            assert!(worker.done(&keys[0], Ok(Err(error.into()))));
+            assert_eq!(store.failure(&keys[0]).unwrap().unwrap().of_all, of_all);
+            let ruled_out = worker.trouble().ruled_out.contains(&arm_name(&keys[1]));
+            assert_eq!(ruled_out, of_all, "{method}");
+        }
+    }
 
     /// Symptom: on a full disk a comparison computed all of its runs and kept none. Cause: only its
     /// end told of a result that could not be stored.
