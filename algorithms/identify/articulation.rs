@@ -41,6 +41,9 @@ pub struct Noise {
     pub rotation: f64,
 }
 
+/// Fewest poses of which a joint is told: two always lie on one axis, whatever joins the parts.
+const LEAST: usize = 3;
+
 /// How two parts are joined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Articulation {
@@ -118,18 +121,22 @@ fn pose(row: &[f64]) -> Isometry3<f64> {
 /// part's tracker.
 ///
 /// # Errors
-/// When there are fewer than 3 poses.
+/// When there are fewer than 3 poses, or a tracker has no noise.
 pub fn estimate(poses: &[[Isometry3<f64>; 2]], noise: [Noise; 2]) -> Result<Articulation> {
-    if poses.len() < 3 {
+    if poses.len() < LEAST {
         return Err(Error::Failed(format!(
-            "{} complete readings of both parts are too few to tell how they are joined",
+            "complete readings of both parts are too few: {}, where {LEAST} are needed",
             poses.len()
         )));
     }
-    let readings: Vec<Reading> = poses
+    let readings: Option<Vec<Reading>> = poses
         .iter()
-        .filter_map(|[fixed, moving]| Reading::new(fixed.inverse() * moving, noise))
+        .map(|[fixed, moving]| Reading::new(fixed.inverse() * moving, noise))
         .collect();
+    let Some(readings) = readings else {
+        let message = "the noise of each tracker must be above 0, of positions and of orientations";
+        return Err(Error::Failed(message.into()));
+    };
     let fits = [Joint::Rigid, Joint::Revolute, Joint::Prismatic].map(|joint| fit(joint, &readings));
     let best = fits.iter().map(|f| f.bic).fold(f64::INFINITY, f64::min);
     let weights = [0, 1, 2].map(|i| (0.5 * (best - fits[i].bic)).exp());
@@ -271,6 +278,19 @@ mod tests {
             assert_eq!(found.joint, Joint::Rigid, "{found:?}");
             assert!(found.axis.is_none() && found.origin.is_none());
         }
-        assert!(estimate(&[], [NOISE; 2]).is_err());
+        let still = tracked(0, |_| mean_pose());
+        for few in [0, 2] {
+            let error = estimate(&still[..few], [NOISE; 2]).unwrap_err().to_string();
+            assert!(
+                error.ends_with(&format!("{few}, where 3 are needed")),
+                "{error}"
+            );
+        }
+        let exact = Noise {
+            position: 0.0,
+            rotation: 0.0,
+        };
+        let error = estimate(&still, [exact; 2]).unwrap_err().to_string();
+        assert!(error.contains("must be above 0"), "{error}");
     }
 }

@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use crate::pipeline::simulated_in;
 use anyhow::Result;
-use asid_algorithms::identify::articulation::Articulation;
 use asid_core::identify::Identified;
 use asid_core::posterior::Direction;
 use asid_core::registry::{IdentifierEntry, find};
@@ -17,11 +16,12 @@ use serde::Serialize;
 use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{
-    CostResult, ParameterResult, SCHEMA, Versions, articulation, articulation_line, caveats,
-    parameter_line, unexplained, widen_by_setting,
+    CostResult, ParameterResult, SCHEMA, Versions, caveats, parameter_line, unexplained,
+    widen_by_setting,
 };
 use super::session::Session;
 use super::settings::{Stage, wrong};
+use super::tracked_joint::TrackedJoint;
 use super::{failure, interrupt, machine, stage, trace, train};
 
 /// Longest episode relative to the task's; a longer one probably has times in another unit.
@@ -79,8 +79,8 @@ pub struct IdentifyResult {
     /// Combinations of unknowns that the logs do not see.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unseen: Vec<Direction>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    articulation: Option<Articulation>,
+    #[serde(flatten)]
+    joint: TrackedJoint,
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     residual: f64,
     /// Root mean square of the residuals at the best fit, in standard deviations of noise and of
@@ -95,14 +95,17 @@ pub struct IdentifyResult {
     versions: Versions,
 }
 
-/// Fits the unknowns to the episodes, in the models that the settings ask for.
-fn fitted(session: &Session, episodes: &[Episode]) -> Result<Identified> {
+/// Fits the unknowns to the episodes, in the models that the settings ask for; returns the number of
+/// these too, 0 for the model as it is.
+fn fitted(session: &Session, episodes: &[Episode]) -> Result<(Identified, usize)> {
     let component = &session.config.identifier;
     let identifier = (find::<IdentifierEntry>(&component.name)?.make)(&component.settings)?;
     let ensemble = session.ensemble_for(&*identifier)?;
     let models = ensemble.as_ref().map(|e| e as &dyn Model);
     let problem = session.problem();
-    Ok(identifier.identify(&simulated_in(&problem, models), episodes)?)
+    let found = identifier.identify(&simulated_in(&problem, models), episodes)?;
+    let members = models.map_or(0, |_| session.config.model_errors.members);
+    Ok((found, members))
 }
 
 /// Identifies from logs.
@@ -152,7 +155,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     )?;
     interrupt::watch(&format!("the identification of {}", arguments.task))?;
     let config = &session.config;
-    let found = fitted(&session, &episodes)?;
+    let (found, members) = fitted(&session, &episodes)?;
 
     let wall_s = clock.elapsed().as_secs_f64();
     let coordinates = &session.task.exploration().start;
@@ -164,7 +167,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         seed: config.seed,
         parameters: ParameterResult::all(&found.posterior, None),
         unseen: found.posterior.unseen.clone(),
-        articulation: articulation(&session, &episodes)?,
+        joint: TrackedJoint::of(&session, &episodes),
         residual: found.residual,
         misfit: found.misfit,
         starts: found
@@ -180,14 +183,13 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         cost: session.cost(wall_s),
         versions: Versions::of(&session),
     };
-    let mut lines = lines(&found, result.articulation.as_ref());
+    let mut lines = lines(&found, &result.joint, members);
     let caveats = caveats(&session.parameters, &found.posterior, widen_by_setting);
     lines.extend(caveats.iter().cloned());
     let names = copies(&arguments.log);
     let mut report = report(&session, &episodes, &found, &names, wall_s)?;
-    report
-        .notes
-        .extend(result.articulation.as_ref().map(articulation_line));
+    report.notes.extend(result.joint.line());
+    report.notes.push(model_line(members));
     report.notes.extend(caveats);
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
         write_json(&folder.join("posterior.json"), &found.posterior)?;
@@ -224,10 +226,10 @@ fn refuse_of_a_study(arguments: &Arguments) -> Result<()> {
 }
 
 /// The identified values, line by line.
-fn lines(found: &Identified, articulation: Option<&Articulation>) -> Vec<String> {
+fn lines(found: &Identified, joint: &TrackedJoint, members: usize) -> Vec<String> {
     let marginals = found.posterior.marginals.iter();
     let mut lines: Vec<String> = marginals.map(parameter_line).collect();
-    lines.extend(articulation.map(articulation_line));
+    lines.extend(joint.line());
     let together = found.misfit.map_or_else(String::new, |misfit| {
         format!(", {misfit:.2} times noise and the simulator's roughness together")
     });
@@ -235,7 +237,19 @@ fn lines(found: &Identified, articulation: Option<&Articulation>) -> Vec<String>
         "residual: {:.2} times the sensors' noise{together}",
         found.residual
     ));
+    lines.push(model_line(members));
     lines
+}
+
+/// Whether the intervals include errors of the model, by the number of models that were fitted.
+fn model_line(members: usize) -> String {
+    if members == 0 {
+        return "the intervals take the model as it is: errors of the model are not in them".into();
+    }
+    format!(
+        "the intervals include errors of the model, by {members} models that differ as [model_errors] says; \
+         those of `asid diagnose` include none, and can be far narrower"
+    )
 }
 
 /// Names of the logs' copies in the folder, in the format of the logs.
@@ -330,6 +344,19 @@ fn report(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Symptom: `asid identify` and `asid diagnose` stated intervals of one parameter that differ by a
+    /// factor of 40. Cause: one includes errors of the model and the other does not, and neither said
+    /// so.
+    #[test]
+    fn an_interval_says_whether_it_includes_errors_of_the_model() {
+        let with = model_line(16);
+        assert!(
+            with.contains("16 models") && with.contains("asid diagnose"),
+            "{with}"
+        );
+        assert!(model_line(0).contains("as it is"));
+    }
 
     #[test]
     fn a_parquet_log_is_copied_under_its_own_ending() {

@@ -31,6 +31,7 @@ mod settings;
 mod solve;
 mod stage;
 mod trace;
+mod tracked_joint;
 mod train;
 mod view;
 mod withheld;

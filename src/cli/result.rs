@@ -1,13 +1,13 @@
 //! `result.json`.
 
 use crate::pipeline::{EpisodeInformation, RunOutcome};
-use asid_algorithms::identify::articulation::{Articulation, Joint, of_episodes};
 use asid_core::identify::Identified;
 use asid_core::posterior::{Direction, Edge, Marginal};
-use asid_core::{Episode, Parameter, Posterior, Result};
+use asid_core::{Parameter, Posterior};
 use serde::Serialize;
 
 use super::session::Session;
+use super::tracked_joint::TrackedJoint;
 use super::world::RealResult;
 
 /// Layout version of `result.json`.
@@ -177,8 +177,8 @@ pub struct RunResult {
     /// readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     misfit: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub articulation: Option<Articulation>,
+    #[serde(flatten)]
+    pub joint: TrackedJoint,
     downstream: DownstreamResult,
     cost: CostResult,
     versions: Versions,
@@ -186,22 +186,14 @@ pub struct RunResult {
 
 impl RunResult {
     /// The result of a run.
-    ///
-    /// # Errors
-    /// When the task's tracked parts do not make sense.
-    pub fn new(
-        session: &Session,
-        truth: &[f64],
-        outcome: &RunOutcome,
-        wall_s: f64,
-    ) -> Result<Self> {
+    pub fn new(session: &Session, truth: &[f64], outcome: &RunOutcome, wall_s: f64) -> Self {
         let config = &session.config;
         let identified = outcome.identified.as_ref();
         let episodes = outcome
             .real
             .as_ref()
             .map(|r| std::slice::from_ref(&r.episode));
-        Ok(Self {
+        Self {
             schema: SCHEMA,
             task: config.task.clone(),
             backend: config.backend.clone(),
@@ -219,7 +211,7 @@ impl RunResult {
             ),
             residual: identified.map(|found| found.residual),
             misfit: identified.and_then(|found| found.misfit),
-            articulation: articulation(session, episodes.unwrap_or_default())?,
+            joint: TrackedJoint::of(session, episodes.unwrap_or_default()),
             downstream: DownstreamResult {
                 metric: session.task.downstream().metric.clone(),
                 value: outcome.attempt.outcome.value,
@@ -227,7 +219,7 @@ impl RunResult {
             },
             cost: session.cost(wall_s),
             versions: Versions::of(session),
-        })
+        }
     }
 }
 
@@ -305,32 +297,4 @@ pub fn unexplained(found: &Identified) -> Option<String> {
          their noise and the simulator's roughness together, and the intervals are widened for it; check the noise, \
          the start of the machine and whether something else differs from the scene"
     ))
-}
-
-/// The joint between the task's two tracked parts, estimated from real episodes; `None` where there
-/// are no such parts or no episode.
-pub fn articulation(session: &Session, episodes: &[Episode]) -> Result<Option<Articulation>> {
-    if episodes.is_empty() {
-        return Ok(None);
-    }
-    let layout = session.model.layout();
-    of_episodes(&*session.task, layout, &session.signals, episodes)
-}
-
-/// Text `revolute joint (100 %), axis …, origin …` of an articulation.
-pub fn articulation_line(found: &Articulation) -> String {
-    let (name, p) = match found.joint {
-        Joint::Rigid => ("rigid", found.probability[0]),
-        Joint::Revolute => ("revolute", found.probability[1]),
-        Joint::Prismatic => ("prismatic", found.probability[2]),
-    };
-    let vector = |v: &[f64; 3]| format!("({:.3}, {:.3}, {:.3})", v[0], v[1], v[2]);
-    let mut line = format!("joint of the tracked parts: {name} ({:.1} %)", 100.0 * p);
-    if let Some(axis) = &found.axis {
-        line += &format!(", axis {}", vector(axis));
-    }
-    if let Some(origin) = &found.origin {
-        line += &format!(" through {} m", vector(origin));
-    }
-    line
 }

@@ -10,9 +10,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
-use super::result::{
-    RunResult, articulation_line, caveats, figure, parameter_line, unexplained, widen_by_setting,
-};
+use super::result::{RunResult, caveats, figure, parameter_line, unexplained, widen_by_setting};
 use super::session::Session;
 use super::{failure, interrupt, trace};
 
@@ -43,11 +41,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let truth = session.truth();
     let outcome = pipeline(&session, &truth)?;
     let wall_s = clock.elapsed().as_secs_f64();
-    let result = RunResult::new(&session, &truth, &outcome, wall_s)?;
+    let result = RunResult::new(&session, &truth, &outcome, wall_s);
     let mut report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
-    report
-        .notes
-        .extend(result.articulation.as_ref().map(articulation_line));
+    report.notes.extend(result.joint.line());
     let caveats = caveats(&session.parameters, &outcome.belief, widen_by_setting);
     report.notes.extend(caveats.iter().cloned());
     let warning = outcome.identified.as_ref().and_then(unexplained);
@@ -79,8 +75,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for (m, t) in outcome.belief.marginals.iter().zip(&truth) {
         writeln!(stdout, "{}, truth {}", parameter_line(m), figure(*t))?;
     }
-    if let Some(found) = &result.articulation {
-        writeln!(stdout, "{}", articulation_line(found))?;
+    if let Some(line) = result.joint.line() {
+        writeln!(stdout, "{line}")?;
     }
     let protocol = session.task.downstream();
     let attempt = &outcome.attempt.outcome;
