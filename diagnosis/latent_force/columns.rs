@@ -172,8 +172,7 @@ impl Columns {
         let (want, steps) = slopes_wanted(context);
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
         if let Some(mut finer) = HalfStep::of(context, base)? {
-            let error = finer.error(theta, &estimate.trajectory, &linear)?;
-            error.join(&mut linear, asked.base);
+            finer.error(theta)?.join(&mut linear, asked.base);
         }
         asked.add_step_error(context);
         let assigned = linear.iter_mut().map(|l| std::mem::take(&mut l.assigned));

@@ -146,8 +146,7 @@ pub fn fit<'p>(
             &variations,
         )?;
         if let Some(finer) = &mut finer {
-            let error = finer.error(&theta, &estimate.trajectory, &linear)?;
-            error.join(&mut linear, m);
+            finer.error(&theta)?.join(&mut linear, m);
         }
         let model = (&unknowns[..], &free[..], &theta[..]);
         let whole = round == 0 || has_segments;

@@ -203,7 +203,8 @@ fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
     let (context, none) = (&mut stands.context, &mut stands.none);
     let (bench, hypothesis) = (null.bench, null.hypothesis);
     if context.walks.iter().any(|w| w.segment.is_none()) {
-        context.finer = Finer::of(&bench.machine, &context.walks);
+        let trajectory = &none.estimate.trajectory;
+        context.finer = Finer::of(&bench.machine, &context.walks, trajectory);
     }
     let shares = none.estimate.missing(context).share < 1.0;
     if shares {

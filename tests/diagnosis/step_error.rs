@@ -85,13 +85,12 @@ fn it_is_what_separates_a_row_of_steps_from_the_solution() {
     };
     let (mut context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
     assert!(context.step_error_center().is_empty());
-    context.finer = Finer::of(&machine, &walks);
+    context.finer = Finer::of(&machine, &walks, &trajectory);
     assert_eq!(context.step_error_center(), [3.0]);
     let mut finer = HalfStep::of(&context, &Hypothesis::default())
         .unwrap()
         .unwrap();
-    let error = finer.error(&[], &trajectory, &linear).unwrap();
-    error.join(&mut linear, 0);
+    finer.error(&[]).unwrap().join(&mut linear, 0);
     let (mut left, mut whole) = (0.0, 0.0);
     for k in 0..rows - 1 {
         let [next, ahead] = [solution(SLIDE, state(k), ROW), state(k + 1)];
