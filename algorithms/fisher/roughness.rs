@@ -7,6 +7,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::precision::{Precision, implied, inflation};
 
+/// Most rows of several models together, since the cost of weights by a whole covariance grows with
+/// their cube. By default the search and all rounds of one model simulate `5 * 64 + 12 * 64` points.
+const MOST_ROWS: usize = 1024;
+
 /// Residuals of a regression over nearby simulations, in units of the sensors' noise.
 #[derive(Clone, Debug)]
 pub struct Roughness {
@@ -31,7 +35,8 @@ impl Roughness {
     }
 
     /// Roughness of several models together: the mean of their covariances, weighed by the degrees
-    /// of freedom. All have the same readings.
+    /// of freedom. All have the same readings. Of more than 1024 rows,
+    /// evenly spaced ones stand for all.
     #[must_use]
     pub fn pooled<'r>(parts: impl Iterator<Item = &'r Self> + Clone) -> Self {
         let count = parts.clone().map(|part| part.rows.nrows()).sum();
@@ -43,7 +48,19 @@ impl Roughness {
             from += part.rows.nrows();
             freedom += part.freedom;
         }
-        Self::new(rows, freedom)
+        let all = Self::new(rows, freedom);
+        if count <= MOST_ROWS {
+            return all;
+        }
+        all.some((0..count).step_by(count.div_ceil(MOST_ROWS)))
+    }
+
+    /// Some of the rows, with their share of the degrees of freedom.
+    fn some(&self, rows: impl Iterator<Item = usize>) -> Self {
+        let rows: Vec<usize> = rows.collect();
+        let share = rows.len() as f64 / self.rows.nrows().max(1) as f64;
+        let freedom = (self.freedom * share).max(f64::MIN_POSITIVE);
+        Self::new(self.rows.select_rows(&rows), freedom)
     }
 
     /// The roughness of the first `readings` entries.
@@ -94,12 +111,7 @@ impl Roughness {
 
     /// The rows in two interleaved halves.
     fn halves(&self) -> [Self; 2] {
-        [0, 1].map(|k| {
-            let rows: Vec<usize> = (k..self.rows.nrows()).step_by(2).collect();
-            let share = rows.len() as f64 / self.rows.nrows().max(1) as f64;
-            let freedom = (self.freedom * share).max(f64::MIN_POSITIVE);
-            Self::new(self.rows.select_rows(&rows), freedom)
-        })
+        [0, 1].map(|k| self.some((k..self.rows.nrows()).step_by(2)))
     }
 
     /// `X R X^T` for `X` of any rows x readings.
@@ -135,13 +147,18 @@ mod tests {
     #[test]
     fn pooled_roughness_has_the_mean_covariance() {
         let rows =
-            |scale: f64| DMatrix::from_fn(6, 4, |i, k| scale * ((3 * i + 2 * k) as f64).sin());
+            |scale: f64| DMatrix::from_fn(7, 4, |i, k| scale * ((3 * i + 2 * k) as f64).sin());
         let [one, other] = [(1.0, 5.0), (3.0, 5.0)].map(|(s, f)| Roughness::new(rows(s), f));
         let pooled = Roughness::pooled([&one, &other].into_iter());
         let eye = DMatrix::identity(4, 4);
         let mean = (one.covariance_of(&eye) + other.covariance_of(&eye)) * 0.5;
         assert!((pooled.covariance_of(&eye) - mean).norm() < 1e-12);
         assert!((pooled.variance()[1] - 5.0 * one.variance()[1]).abs() < 1e-12);
+        // Of many models alike, some of the rows say the same.
+        let many = Roughness::pooled(std::iter::repeat_n(&one, 400));
+        assert!(many.rows.nrows() <= MOST_ROWS);
+        let error = many.covariance_of(&eye) - one.covariance_of(&eye);
+        assert!(error.norm() < 0.01 * one.covariance_of(&eye).norm());
     }
 
     #[test]
