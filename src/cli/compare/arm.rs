@@ -96,8 +96,8 @@ impl Arm {
         }
         let set = self.common.set.iter();
         let mut set = set.filter_map(|line| line.parse::<toml::Table>().ok());
-        let base = self.common.base.values();
-        base.into_iter().any(|value| holds(value, path))
+        let mut base = self.common.base.values();
+        base.any(|value| holds(value, path))
             || set.any(|table| table.values().any(|value| holds(value, path)))
     }
 }
