@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use crate::pipeline::simulated_in;
 use anyhow::Result;
+use asid_algorithms::identify::articulation::Articulation;
 use asid_core::identify::Identified;
 use asid_core::posterior::Direction;
 use asid_core::registry::{IdentifierEntry, find};
@@ -79,7 +80,11 @@ pub struct IdentifyResult {
     /// Combinations of unknowns that the logs do not see.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     unseen: Vec<Direction>,
-    #[serde(flatten)]
+    #[serde(
+        rename = "articulation",
+        skip_serializing_if = "TrackedJoint::is_missing"
+    )]
+    #[schemars(with = "Option<Articulation>")]
     joint: TrackedJoint,
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     residual: f64,

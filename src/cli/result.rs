@@ -1,6 +1,7 @@
 //! `result.json`.
 
 use crate::pipeline::{EpisodeInformation, RunOutcome};
+use asid_algorithms::identify::articulation::Articulation;
 use asid_core::identify::Identified;
 use asid_core::posterior::{Direction, Edge, Marginal};
 use asid_core::{Parameter, Posterior};
@@ -177,7 +178,11 @@ pub struct RunResult {
     /// readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     misfit: Option<f64>,
-    #[serde(flatten)]
+    #[serde(
+        rename = "articulation",
+        skip_serializing_if = "TrackedJoint::is_missing"
+    )]
+    #[schemars(with = "Option<Articulation>")]
     pub joint: TrackedJoint,
     downstream: DownstreamResult,
     cost: CostResult,

@@ -7,11 +7,11 @@ use serde::Serialize;
 use super::session::Session;
 
 /// The joint between the task's two tracked parts.
-#[derive(Serialize, schemars::JsonSchema)]
+#[derive(Serialize)]
+#[serde(transparent)]
 pub struct TrackedJoint {
     /// As estimated from real episodes; missing where there are no such parts or no episode, and
     /// where it cannot be told.
-    #[serde(skip_serializing_if = "Option::is_none")]
     articulation: Option<Articulation>,
     /// Why it cannot be told.
     #[serde(skip)]
@@ -40,6 +40,11 @@ impl TrackedJoint {
             articulation,
             untold,
         }
+    }
+
+    /// Whether there is no estimate.
+    pub fn is_missing(&self) -> bool {
+        self.articulation.is_none()
     }
 
     /// What is said of it; `None` where there is nothing to say.
@@ -84,7 +89,7 @@ mod tests {
             line.ends_with("cannot be told, too few readings: 2"),
             "{line}"
         );
-        assert_eq!(serde_json::to_string(&joint).unwrap(), "{}");
+        assert!(joint.is_missing());
         assert_eq!(TrackedJoint::new(Ok(None)).line(), None);
     }
 }
