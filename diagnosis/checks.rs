@@ -82,7 +82,7 @@ pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
         "data",
         sound && !few,
         format!(
-            "{} + {} episodes, {seconds:.1} s, {present} readings, {:.1} % missing{named}{too_little}",
+            "episodes: {} + {}, {seconds:.1} s, {present} readings, {:.1} % missing{named}{too_little}",
             train.episodes.len(),
             test.episodes.len(),
             100.0 * missing

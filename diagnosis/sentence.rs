@@ -1,6 +1,6 @@
 //! The answer in one sentence.
 
-use asid_results::naming::grouped;
+use asid_results::naming::{grouped, joined};
 
 use crate::findings::Repeats;
 use crate::result::{DiagnosisResult, Kind};
@@ -49,12 +49,21 @@ fn within_tolerance(result: &DiagnosisResult) -> Option<String> {
     let mut laws: Vec<&str> = result.tolerances.iter().map(|t| &*t.effect).collect();
     laws.sort_unstable();
     laws.dedup();
-    let (last, others) = laws.split_last()?;
-    Some(if others.is_empty() {
-        format!("{last} within its tolerance")
-    } else {
-        format!("{} and {last} within their tolerances", others.join(", "))
-    })
+    match &laws[..] {
+        [] => None,
+        [one] => Some(format!("{one} within its tolerance")),
+        several => Some(format!(
+            "{} within their tolerances",
+            joined(several, "and")
+        )),
+    }
+}
+
+/// A set of effects as the subject of a sentence, and the end of its verb.
+fn subject(labels: &[String]) -> (String, &'static str) {
+    let laws = grouped(labels);
+    let end = if laws.len() == 1 { "s" } else { "" };
+    (joined(&laws, "and"), end)
 }
 
 fn percent(x: f64) -> String {
@@ -72,6 +81,16 @@ pub struct Training {
     pub alone: bool,
 }
 
+/// The interval of a share, percent, in brackets; empty if its ends read the same.
+fn in_brackets(interval: [f64; 2]) -> String {
+    let [low, high] = interval.map(|x| format!("{:.0}", 100.0 * x));
+    if low == high {
+        String::new()
+    } else {
+        format!(" ({low} to {high})")
+    }
+}
+
 /// Says how much of the gap is closed, with its interval if there is one.
 fn part_closed(result: &DiagnosisResult, training: Training) -> String {
     if training.alone {
@@ -81,12 +100,7 @@ fn part_closed(result: &DiagnosisResult, training: Training) -> String {
         );
     }
     match (result.gap.closed, result.gap.closed_interval95) {
-        (Some(c), Some([low, high])) => format!(
-            "{} of it ({:.0} to {:.0})",
-            percent(c),
-            100.0 * low,
-            100.0 * high
-        ),
+        (Some(c), Some(interval)) => format!("{} of it{}", percent(c), in_brackets(interval)),
         (Some(c), None) => format!("{} of it", percent(c)),
         _ => "what there is of it".into(),
     }
@@ -168,10 +182,10 @@ fn effects(result: &DiagnosisResult, training: Training) -> String {
         let rivals = rivals.join(", nor from ");
         format!(" These data cannot tell it from {rivals}.")
     };
+    let (named, end) = subject(&result.verdict.effects);
     format!(
-        "{}{}{} explains {}.{}{ambiguous}{}",
+        "{}{named}{} explain{end} {}.{}{ambiguous}{}",
         place(result),
-        grouped(&result.verdict.effects).join(" with "),
         within_tolerance(result).map_or_else(String::new, |t| format!(", beside {t},")),
         part_closed(result, training),
         beside(result),
@@ -189,14 +203,14 @@ fn unknown(
     let (place, closed) = (place(result), part_closed(result, training));
     let closes_most = result.gap.closed.is_some_and(|c| c > 0.5);
     let rest = rest.map_or_else(String::new, |r| format!(": {r}"));
-    let names = grouped(labels).join(" with ");
+    let (names, end) = subject(labels);
     match (closes_most, labels.is_empty()) {
         (true, true) => format!(
             "{place}{} close {closed}, but too much of the missing force and of the gap is left to be theirs: something else is missing{rest}.",
             within_tolerance(result).unwrap_or_else(|| "the study's parameters".into()),
         ),
         (true, false) => format!(
-            "{place}{names} explains {closed}, but too much of the missing force and of the gap is left to name it as the cause: something else is missing{rest}."
+            "{place}{names} explain{end} {closed}, but too much of the missing force and of the gap is left to name it as the cause: something else is missing{rest}."
         ),
         (false, true) => {
             let check = if result.missing_force.is_empty() {
@@ -209,7 +223,7 @@ fn unknown(
             )
         }
         (false, false) => format!(
-            "{place}nothing in the catalogue explains it: {names} comes nearest, with {closed}."
+            "{place}nothing in the catalogue explains it: {names} come{end} nearest, with {closed}."
         ),
     }
 }
@@ -239,4 +253,28 @@ pub fn sentence(
         " The search was stopped early; what it left out may change the answer."
     };
     body + &caution(result) + early
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{in_brackets, subject};
+
+    /// Symptom: "explains 100 % of it (100 to 100)". Cause: the interval was written whatever its
+    /// rounded ends were.
+    #[test]
+    fn an_interval_without_width_is_not_written() {
+        assert_eq!(in_brackets([0.997, 1.0]), "");
+        assert_eq!(in_brackets([0.961, 0.993]), " (96 to 99)");
+    }
+
+    /// Symptom: "payload@hand with gravity-tilt with drag@ball explains". Cause: the names of a set
+    /// were joined by one word.
+    #[test]
+    fn several_effects_are_a_list_and_explain() {
+        let labels = ["payload@hand", "gravity-tilt", "drag@ball"].map(str::to_owned);
+        let (named, end) = subject(&labels);
+        let expected = "payload@hand, gravity-tilt and drag@ball explain";
+        assert_eq!(format!("{named} explain{end}"), expected);
+        assert_eq!(subject(&labels[..1]), ("payload@hand".into(), "s"));
+    }
 }

@@ -104,17 +104,17 @@ impl LogNotes {
             all.push(stamps_read_as(unit));
         }
         for (count, what) in [
-            (self.doubled, "rows with the stamp of another left out"),
+            (self.doubled, "rows left out, since another has their stamp"),
             (self.reordered, "rows put in the order of their stamps"),
             (self.held, "missing commands held from the row before"),
         ] {
             if count > 0 {
-                all.push(format!("{count} {what}"));
+                all.push(format!("{what}: {count}"));
             }
         }
         for (sensor, jumps) in &self.turns {
             all.push(format!(
-                "the angle `{sensor}` jumped by a turn {jumps} times, as one that is reported within one turn: its turns are counted"
+                "the angle `{sensor}` is reported within one turn: its turns are counted (jumps by a turn: {jumps})"
             ));
         }
         for (name, count) in &self.lost {

@@ -126,9 +126,12 @@ fn closed(d: &DiagnosisResult) -> Tile {
     let note = note.map_or_else(
         || "of what is above the noise floor, squared".to_owned(),
         |[low, high]| {
+            let [low, end] = [low, high].map(|x| round((100.0 * x).round(), 3));
+            if low == end {
+                return "of the squared gap above the floor".to_owned();
+            }
             format!(
-                "95 % interval {} to {}; of the squared gap above the floor",
-                round((100.0 * low).round(), 3),
+                "95 % interval {low} to {}; of the squared gap above the floor",
                 percent(high)
             )
         },

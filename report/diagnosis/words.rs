@@ -2,6 +2,7 @@
 
 use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult};
 use asid_results::naming::grouped;
+pub(super) use asid_results::naming::{count, joined};
 use asid_results::trace::DiagnosisTrace;
 
 use crate::number::{NOT_A_NUMBER, Precision, decimals, quantity, round, significant};
@@ -97,20 +98,6 @@ pub fn values(trace: &DiagnosisTrace, effect: &EffectResult) -> String {
         return format!("{text} (at an end of its range: the best value may lie beyond)");
     }
     text
-}
-
-/// `a`, `a and b`, `a, b and c`.
-pub(super) fn joined(names: &[String], last: &str) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
-    }
-}
-
-/// `1 episode`, `2 episodes`.
-pub(super) fn count(number: usize, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use asid_core::posterior::Direction;
 use asid_core::registry::{IdentifierEntry, find};
 use asid_core::{Episode, Error, Model, Parameter};
 use asid_report::run::{RealWorld, RunReport};
+use asid_results::naming::joined;
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Simulator, Worlds};
@@ -292,7 +293,7 @@ fn read(session: &Session, path: &Path) -> Result<Episode> {
     {
         return Err(fail(format!(
             "no row has a reading of all of {}",
-            names.join(", ")
+            joined(&names, "and")
         ))
         .into());
     }

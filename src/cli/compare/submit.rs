@@ -7,6 +7,7 @@ use anyhow::Result;
 use asid_comparison::slurm::Script;
 use asid_comparison::store::{Store, write};
 use asid_core::Error;
+use asid_results::naming::count;
 
 use super::folder::claim;
 use super::request::document;
@@ -74,7 +75,8 @@ pub fn submit(arguments: &Arguments) -> Result<()> {
         return Err(Error::Failed(format!("sbatch refused: {}", said.trim())).into());
     }
     failure::note(&format!(
-        "{cells} runs in {}; the tables are written when the last one is done",
+        "{} in {}; the tables are written when the last one is done",
+        count(cells, "run"),
         root.display()
     ));
     write!(stdout, "{}", String::from_utf8_lossy(&output.stdout))?;

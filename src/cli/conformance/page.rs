@@ -2,6 +2,7 @@
 
 use asid_conformance::{FAMILIES, Outcome, Row, checks};
 use asid_report::page::{Cell, Column, Page, Section, Table, Tone};
+use asid_results::naming::{count as counted, joined};
 
 use super::cell::{cell, limit};
 use super::result::{ConformanceResult, Count, Engine};
@@ -20,7 +21,7 @@ pub fn html(result: &ConformanceResult, command: &str) -> String {
         .badge(&badge, tone)
         .lead(format!(
             "{asked} checks of {}, against closed-form theory and against the contract of a backend.",
-            joined(result.engines.iter().map(|e| e.name.as_str()))
+            engines(result)
         ));
     for engine in &result.engines {
         page = page.fact(
@@ -74,14 +75,13 @@ pub fn html(result: &ConformanceResult, command: &str) -> String {
     .html()
 }
 
-/// Joins names: `a`, `a and b`, `a, b and c`.
-fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let names: Vec<&str> = names.collect();
-    match &names[..] {
-        [] => "no engine".into(),
-        [one] => (*one).into(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+/// The engines of a result, by name.
+fn engines(result: &ConformanceResult) -> String {
+    let names: Vec<&str> = result.engines.iter().map(|e| &*e.name).collect();
+    if names.is_empty() {
+        return "no engine".into();
     }
+    joined(&names, "and")
 }
 
 /// An engine in one sentence.
@@ -96,7 +96,7 @@ fn verdict(engine: &Engine) -> String {
         n => format!("Fails {n} of {asked} checks of what it claims"),
     }];
     if count.known_deviation > 0 {
-        parts.push(format!("{} known deviations", count.known_deviation));
+        parts.push(counted(count.known_deviation, "known deviation"));
     }
     if count.not_claimed > 0 {
         let plural = if count.not_claimed == 1 { "is" } else { "are" };

@@ -11,6 +11,7 @@ use asid_diagnosis::findings::trials;
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
 use asid_results::diagnosis::{RealWorld, TaskTrial};
+use asid_results::naming::{count, joined};
 
 use super::super::model;
 use super::super::options::{Algorithms, Common, Real, Worlds};
@@ -212,8 +213,9 @@ impl Machine {
         }
         progress.end();
         let what = format!(
-            "{n} episodes were played to tell apart {}",
-            labels.join(", ")
+            "{} played to tell apart {}",
+            count(n, "episode"),
+            joined(&labels, "and")
         );
         Ok(Some(Experiments { logs, what }))
     }

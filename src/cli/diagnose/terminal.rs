@@ -3,7 +3,7 @@
 use asid_report::diagnosis::{effect_values, real_world_lines};
 use asid_report::number::{Precision, quantity};
 use asid_results::diagnosis::DiagnosisResult;
-use asid_results::naming::grouped;
+use asid_results::naming::{count, grouped};
 use asid_results::trace::DiagnosisTrace;
 
 /// The answer as lines for the terminal.
@@ -49,7 +49,10 @@ pub fn lines(
         line(&format!("  {} = {told}", p.name));
     }
     if let Some(c) = &result.calibration {
-        line(&format!("calibration on simulated logs, {} runs:", c.runs));
+        line(&format!(
+            "calibration on simulated logs, {}:",
+            count(c.runs, "run")
+        ));
         for r in c.rows.iter().filter(|r| r.runs > 0) {
             let lacks = if r.effects.is_empty() {
                 "nothing".to_owned()

@@ -121,9 +121,9 @@ pub fn export(request: &Request<'_>) -> Result<()> {
     let count = |native: &str| result.effects.iter().filter(|e| e.native == native).count();
     writeln!(
         stdout,
-        "wrote {}: {} values; effects: {} whole, {} nearly, {} left out",
+        "wrote {}: {}; effects: {} whole, {} nearly, {} left out",
         result.file,
-        written.values.len(),
+        asid_results::naming::count(written.values.len(), "value"),
         count("whole"),
         count("nearly"),
         count("left-out"),
