@@ -28,6 +28,7 @@ mod places;
 pub mod play;
 pub mod rehearse;
 mod search;
+mod standstill;
 pub mod start;
 pub mod tells;
 mod valleys;

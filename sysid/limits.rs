@@ -10,6 +10,7 @@ mod unchecked;
 use std::collections::BTreeMap;
 
 use asid_core::error::{Error, Result};
+use asid_core::layout::{Joint, JointKind};
 use asid_mjcf::Plant;
 
 /// Share of a joint's range that is kept free at either end: a real machine may have its stop
@@ -21,6 +22,10 @@ const END_MARGIN: f64 = 0.02;
 /// It may also pass the end by this share. Stops of a simulated machine yield by less (MuJoCo's
 /// default `solimp` lets them yield by a thousandth of a rad or m).
 pub const STOP: f64 = 2e-3;
+
+/// Digits of the numbers in messages on ranges: enough to recognise radians as what they are in
+/// degrees.
+const DIGITS: usize = 3;
 
 /// Share of the command's range that is kept free at either end.
 const COMMAND_MARGIN: f64 = 0.0;
@@ -131,8 +136,8 @@ impl Limits {
     /// Limits of a machine: those requested, and the ranges of its model.
     ///
     /// # Errors
-    /// When a name is unknown or that of a part whose limits cannot be checked, or a low end is not
-    /// below its high end.
+    /// When a name is unknown or that of a part whose limits cannot be checked, a low end is not
+    /// below its high end, or a position lies beyond the joint's own range.
     pub fn new(
         plant: &Plant,
         ranges: &dyn Fn(usize) -> Option<[f64; 2]>,
@@ -146,6 +151,9 @@ impl Limits {
                     "limit_position",
                     format!("position of `{name}`: {low} is not below {high}"),
                 ));
+            }
+            if let Some(joint) = layout.joints.iter().position(|j| j.name == *name) {
+                within_range(&layout.joints[joint], ranges(joint), [*low, *high])?;
             }
         }
         let joints = layout
@@ -216,6 +224,31 @@ impl Limits {
             unchecked: unchecked::sentences(plant, request),
         })
     }
+}
+
+/// Refuses a limit of a joint that goes beyond its `range` in the model by more than stops yield.
+///
+/// Degrees in place of radians would otherwise widen the range.
+fn within_range(joint: &Joint, range: Option<[f64; 2]>, given: [f64; 2]) -> Result<()> {
+    let Some([low, high]) = range else {
+        return Ok(());
+    };
+    let hair = STOP * (high - low);
+    if given[0] >= low - hair && given[1] <= high + hair {
+        return Ok(());
+    }
+    let (name, [from, to]) = (&joint.name, given);
+    let unit = match joint.kind {
+        JointKind::Hinge => "rad (90 degrees are 1.571 rad)",
+        _ => "m",
+    };
+    Err(wrong(
+        "limit_position",
+        format!(
+            "position of `{name}`: {from} to {to} goes beyond the joint's range in the model, {low:.DIGITS$} to {high:.DIGITS$}; it is in {unit}; \
+             give a range within that one, or widen the model's"
+        ),
+    ))
 }
 
 /// Pairs of bodies that can touch, each once, without those that are allowed to.
@@ -298,3 +331,36 @@ impl Excess {
 ///
 /// It exceeds that of a motion that merely breaks a limit.
 pub const DIVERGED: f64 = 1e3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Scene;
+
+    /// A hinge of a quarter turn to either side, on a wheel that turns freely.
+    const ARM: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
+        <body><joint name="wheel" axis="0 1 0"/><geom size="0.1"/>
+        <body><joint name="elbow" axis="0 1 0" range="-1.57 1.57"/><geom size="0.05"/></body></body>
+        </worldbody></mujoco>"#;
+
+    /// Symptom: `--limit-position elbow:-90:90` let a joint of ±1.57 rad turn by 90 rad. Cause: a
+    /// limit that was given replaced the model's range, whatever that is.
+    #[test]
+    fn a_limit_in_degrees_does_not_widen_the_models_range() {
+        let plant = Plant::of(&Scene::from_xml("arm", ARM, &[]).unwrap()).unwrap();
+        let limits = |joint: &str, range: [f64; 2]| {
+            let request = LimitRequest {
+                position: [(joint.to_owned(), range)].into(),
+                ..LimitRequest::default()
+            };
+            Limits::new(&plant, &|joint| plant.joints[joint].range, &request)
+        };
+        let said = limits("elbow", [-90.0, 90.0]).unwrap_err().to_string();
+        let parts = ["`elbow`: -90 to 90", "-1.570 to 1.570", "is in rad"];
+        assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+        assert!(limits("elbow", [0.0, 2.0]).is_err());
+        // The whole range, and all of a joint that has none.
+        assert!(limits("elbow", [-1.57, 1.57]).is_ok());
+        assert!(limits("wheel", [-90.0, 90.0]).is_ok());
+    }
+}

@@ -124,14 +124,15 @@ impl Player<'_> {
                     format!(
                         "position of `{}` {at:.3}, {} beyond its limit of {low:.3} to {high:.3}",
                         joint.name,
-                        distance(beyond)
+                        measured(beyond)
                     )
                 });
             }
             if let Some(limit) = joint.speed {
                 let speed = v[joint.dof].abs();
                 excess.add(speed / limit - 1.0, frames, || {
-                    format!("speed of `{}` {speed:.3}, limit {limit}", joint.name)
+                    let speed = measured(speed);
+                    format!("speed of `{}` {speed}, limit {limit}", joint.name)
                 });
             }
         }
@@ -155,8 +156,10 @@ impl Player<'_> {
             let force = drive.force(command, q[joint.qpos], v[joint.qvel]).abs();
             excess.add(force / limit.force - 1.0, frames, || {
                 format!(
-                    "force of `{}` {force:.3}, limit {}",
-                    layout.actuators[limit.actuator].name, limit.force
+                    "force of `{}` {}, limit {}",
+                    layout.actuators[limit.actuator].name,
+                    measured(force),
+                    limit.force
                 )
             });
         }
@@ -190,8 +193,8 @@ impl Player<'_> {
     }
 }
 
-/// A distance, rad or m, with its significant digits.
-fn distance(x: f64) -> String {
+/// A distance, speed or force in SI units, with its significant digits.
+fn measured(x: f64) -> String {
     if x < 0.01 {
         format!("{x:.1e}")
     } else {

@@ -182,3 +182,26 @@ fn a_motion_keeps_the_ranges_of_joints_on_every_engine() {
         assert_eq!(joints[1].position, None, "{engine}");
     }
 }
+
+/// Symptom: a motion of zeros under `--limit-force 1e-6` was a success, "all limits hold".
+///
+/// Cause: a motion was looked at for the limits that it breaks, and one that stands still breaks
+/// none.
+#[test]
+fn a_motion_that_stands_still_is_refused_with_the_limit_that_binds() {
+    let folder = tempfile::tempdir().unwrap();
+    let force = |limit: &str| format!("limit_force = [\"{limit}\"]\n{SETTINGS}");
+    let size = |limit: &str| {
+        let (model, config) = written(folder.path(), CART, &force(limit));
+        let subject = Subject::open(&model, Some("mujoco")).unwrap();
+        let mut setup = MotionSetup::new(&subject, &config, 2).unwrap();
+        let motion = setup
+            .design(&config, Method::Multisine, 0, &Silent)
+            .unwrap();
+        setup.refuse_standstill(&motion)
+    };
+    let said = size("0.000001").unwrap_err().to_string();
+    let parts = ["would stand still", "force of `belt`", "limit 0.000001"];
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+    assert!(size("4").is_ok());
+}

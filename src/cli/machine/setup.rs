@@ -268,8 +268,8 @@ fn settle(
     let (at_stop, beyond) = player.look_at_begin(values)?;
     if let Some((what, _)) = beyond.worst {
         let message = format!(
-            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one (that of a joint in the \
-             model is its range less 2 % at either end)"
+            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one (where none is given, \
+             that of a joint is its range in the model less 2 % at either end)"
         );
         return Err(Error::Config {
             key: "limit_position, limit_speed, limit_force, limit_box".into(),
