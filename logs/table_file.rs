@@ -26,6 +26,15 @@ impl Column {
         }
     }
 
+    /// Its name, or its place in the table of these `columns` if it has none.
+    fn shown(&self, columns: &[Self]) -> String {
+        if !self.name.is_empty() {
+            return self.name.clone();
+        }
+        let place = columns.iter().position(|c| std::ptr::eq(c, self));
+        format!("column {} without a name", place.unwrap_or(0) + 1)
+    }
+
     /// Whether no row has a number.
     fn is_numberless(&self) -> bool {
         self.values.iter().all(|x| !x.is_finite())
@@ -85,7 +94,11 @@ fn rank(name: &str) -> Option<usize> {
 pub fn stamps(columns: &[Column]) -> Option<usize> {
     let named = (0..columns.len()).filter_map(|i| Some((rank(&columns[i].name)?, i)));
     let grows = |values: &[f64]| values.len() > 2 && values.windows(2).all(|w| w[1] > w[0]);
-    let growing = || (0..columns.len()).filter(|i| grows(&columns[*i].values));
+    // A column without a name, as pandas writes one for its index, counts rows.
+    let growing = || {
+        let all = 0..columns.len();
+        all.filter(|i| !columns[*i].name.is_empty() && grows(&columns[*i].values))
+    };
     let of_time = |i: &usize| {
         let name = columns[*i].name.to_lowercase();
         WORDS.iter().any(|word| name.contains(word))
@@ -119,7 +132,8 @@ pub fn log(name: &str, columns: &[Column], given: Option<&str>) -> Result<RawLog
         None => stamps(columns),
     };
     let Some(place) = place else {
-        let names: Vec<&str> = columns.iter().take(8).map(|c| &*c.name).collect();
+        let shown = columns.iter().take(8).map(|c| c.shown(columns));
+        let names: Vec<String> = shown.collect();
         return Err(format!(
             "has no column of stamps: one named `time`, or one that only grows; its columns are {}",
             names.join(", ")
@@ -145,7 +159,12 @@ pub fn log(name: &str, columns: &[Column], given: Option<&str>) -> Result<RawLog
         let all = columns.iter().enumerate();
         all.filter(|(i, _)| *i != place).map(|(_, c)| c)
     };
-    let numberless = others().filter(|c| !c.name.is_empty() && c.is_numberless());
+    let (named, nameless): (Vec<_>, Vec<_>) = others().partition(|c| !c.name.is_empty());
+    let numberless = named.iter().filter(|c| c.is_numberless());
+    // The first one may be an index, which nobody misses.
+    let lost = nameless.iter().filter(|c| !std::ptr::eq(**c, &columns[0]));
+    let lost = lost.filter(|c| !c.is_numberless());
+    let lost = lost.map(|c| format!("{} is not read: name it in the header", c.shown(columns)));
     Ok(RawLog {
         name: name.to_owned(),
         numberless: numberless
@@ -154,10 +173,14 @@ pub fn log(name: &str, columns: &[Column], given: Option<&str>) -> Result<RawLog
                 cell: c.text.clone(),
             })
             .collect(),
-        series: others().filter_map(|c| series(&time, c)).collect(),
+        series: named.iter().filter_map(|c| series(&time, c)).collect(),
         stamps: Some(stamps.name.clone()),
         stamps_unit: stated,
-        remarks: guessed.map(stamps_read_as).into_iter().collect(),
+        remarks: guessed
+            .map(stamps_read_as)
+            .into_iter()
+            .chain(lost)
+            .collect(),
     })
 }
 
@@ -211,6 +234,24 @@ mod tests {
         let log = log("log", &rows, None).unwrap();
         assert_eq!(log.stamps.as_deref(), Some("Time [ms]"));
         assert_eq!(log.series.len(), 2);
+    }
+
+    /// Symptom: "not used: , " and "left are ,", and a column without a name was the clock.
+    #[test]
+    fn a_column_without_a_name_is_told_by_its_place() {
+        let column = |name: &str, values: [f64; 3]| Column {
+            values: values.into(),
+            ..Column::named(name)
+        };
+        let (counter, time) = ([0.0, 1.0, 2.0], [0.0, 0.01, 0.02]);
+        let index = column("", counter);
+        let table = [index.clone(), column("time", time), column("", counter)];
+        let read = log("log", &table, None).unwrap();
+        assert!(read.series.is_empty());
+        let expected = "column 3 without a name is not read: name it in the header";
+        assert_eq!(read.remarks, [expected]);
+        let said = log("log", &[index, column("q", [1.0; 3])], None).unwrap_err();
+        assert!(said.contains("column 1 without a name, q"), "{said}");
     }
 
     /// Symptom: a table with a row of units below its header had no column at all ("nothing is left

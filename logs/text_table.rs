@@ -2,8 +2,8 @@
 //!
 //! Lines that begin with `#` are comments, above the header and below it. The first other line is
 //! the header. An exception is a row of numbers below a comment with as many cells, as NumPy writes
-//! names. Commas, semicolons or tabs separate cells; commas that do not separate cells may be
-//! decimal. Rows are counted as an editor counts lines, from 1.
+//! names. Commas, semicolons or tabs separate cells; commas that do not separate cells, also those
+//! in quotes, may be decimal. Rows are counted as an editor counts lines, from 1.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -18,10 +18,10 @@ const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
 const COMMENT: char = '#';
 
 /// The text of a file, without a byte order mark, which Excel writes. Its "Unicode Text" is UTF-16,
-/// which the mark tells.
+/// which the mark tells. A lone carriage return, as old programs end a line, ends one.
 ///
 /// # Errors
-/// When the file cannot be read.
+/// When the file cannot be read, or is no text.
 pub fn text(path: &Path) -> Result<String, String> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
     let wide = |unit: fn([u8; 2]) -> u16| {
@@ -31,9 +31,21 @@ pub fn text(path: &Path) -> Result<String, String> {
     let text = match bytes.get(..2) {
         Some([0xff, 0xfe]) => wide(u16::from_le_bytes),
         Some([0xfe, 0xff]) => wide(u16::from_be_bytes),
+        // No text of one byte a letter has a zero.
+        _ if bytes.contains(&0) => {
+            return Err(
+                "is no text: a table is text in UTF-8, and files of other kinds have their own ending (.mcap, .db3, .parquet)"
+                    .into(),
+            );
+        }
         _ => String::from_utf8_lossy(&bytes).into_owned(),
     };
-    Ok(text.trim_start_matches('\u{feff}').to_owned())
+    let text = text.trim_start_matches('\u{feff}');
+    Ok(if text.contains('\n') {
+        text.to_owned()
+    } else {
+        text.replace('\r', "\n")
+    })
 }
 
 /// Separator of a table's cells, and its number format.
@@ -90,6 +102,15 @@ fn cell_number(text: &str, decimal_comma: bool) -> Option<f64> {
         text.parse()
     };
     number.ok().filter(|x: &f64| x.is_finite())
+}
+
+/// Whether a number with a comma may be a whole one in groups of three digits, as `12,345` is.
+fn is_grouped(text: &str) -> bool {
+    let digits = |part: &str| part.bytes().all(|b| b.is_ascii_digit());
+    let mut groups = text.trim_start_matches(['-', '+']).split(',');
+    let first = groups.next().unwrap_or_default();
+    let leads = (1..=3).contains(&first.len()) && digits(first) && !first.starts_with('0');
+    leads && groups.all(|group| group.len() == 3 && digits(group))
 }
 
 /// The separator of a header's cells: the most frequent of comma, semicolon and tab.
@@ -156,6 +177,7 @@ impl<'t> TextTable<'t> {
         }
         let mut table = Self::headed(text)
             .ok_or("holds comments alone: names of columns and rows are missing")?;
+        table.refuse_as_header()?;
         refuse_twice(&table.header)?;
         if table.rows().next().is_none() {
             return Err(format!(
@@ -207,18 +229,37 @@ impl<'t> TextTable<'t> {
         None
     }
 
-    /// Whether numbers have decimal commas: at least one has, and none has a point.
-    fn has_decimal_commas(&self) -> bool {
-        if self.marks.delimiter == b',' {
-            return false;
+    /// Refuses a header that is a row of numbers, or that no separator divides: a log has at least
+    /// its stamps and a reading.
+    fn refuse_as_header(&self) -> Result<(), String> {
+        let row = self.header_row;
+        let number = |text: &String| cell_number(text, true);
+        let is_number = |text: &String| number(text).is_some_and(f64::is_finite);
+        if self.header.iter().all(|c| number(c).is_some()) && self.header.iter().any(is_number) {
+            return Err(format!(
+                "row {row} has numbers and no names: write a header above it, with a name for each column, such as `time`"
+            ));
         }
+        match &self.header[..] {
+            [one] => Err(format!(
+                "row {row}, the header, is one cell, `{}`: commas, semicolons or tabs separate cells",
+                shortened(one)
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether numbers have decimal commas: at least one has, which is no whole number in groups of
+    /// three digits, and none has a point.
+    fn has_decimal_commas(&self) -> bool {
         let mut commas = false;
         for row in self.rows().map_while(Result::ok) {
             for cell in &row.cells {
                 if cell.contains('.') && cell_number(cell, false).is_some() {
                     return false;
                 }
-                commas |= cell.contains(',') && cell_number(cell, true).is_some();
+                let has_comma = cell.contains(',') && !is_grouped(cell);
+                commas |= has_comma && cell_number(cell, true).is_some();
             }
         }
         commas
@@ -259,9 +300,16 @@ impl<'t> TextTable<'t> {
     fn row(&self, number: usize, cells: StringRecord) -> Result<Row, String> {
         let expected = self.header.len();
         if cells.len() < expected || cells.iter().skip(expected).any(|c| !c.is_empty()) {
+            // A decimal comma makes two cells of a number.
+            let halved = self.marks.delimiter == b',' && cells.len() > expected;
+            let then = if halved {
+                "where commas are decimal marks, separate cells by semicolons; else complete or delete the row that is wrong"
+            } else {
+                "complete or delete the row that is wrong"
+            };
             return Err(format!(
-                "row {number}: cells found: {}, expected by the header (row {}): {expected}; complete or delete the row that is wrong; lines \
-                 above the header begin with `{COMMENT}`",
+                "row {number}: cells found: {}, expected by the header (row {}): {expected}; {then}; lines above the header begin with \
+                 `{COMMENT}`",
                 cells.len(),
                 self.header_row
             ));
@@ -271,6 +319,17 @@ impl<'t> TextTable<'t> {
             cells,
             decimal_comma: self.marks.decimal_comma,
         })
+    }
+}
+
+/// Largest number of characters of a cell that a message shows: a line on a terminal.
+const SHOWN: usize = 60;
+
+/// The beginning of a text, if it is long.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }
 
@@ -371,6 +430,46 @@ mod tests {
         let table = TextTable::of("t;x\n0.5;1,234\n").unwrap();
         let row = table.rows().next().unwrap().unwrap();
         assert_eq!((row.number_in(0), row.number_in(1)), (Some(0.5), None));
+    }
+
+    /// Symptom: `"0,25"` in quotes was text, and the stamps held "no numbers". Cause: where commas
+    /// separate cells, none was taken for a decimal mark.
+    #[test]
+    fn decimal_commas_in_quotes_are_read_where_commas_divide_cells() {
+        let quoted = "\"t\",\"x\"\n\"0,00\",\"-5,25\"\n\"0,01\",\"1,234\"\n";
+        assert_eq!(numbers(quoted).0, [[0.0, -5.25], [0.01, 1.234]]);
+        // Groups of thousands alone are not taken for decimals.
+        let table = TextTable::of("t,x\n1,\"12,345\"\n").unwrap();
+        let row = table.rows().next().unwrap().unwrap();
+        assert_eq!(row.number_in(1), None);
+    }
+
+    /// Symptom: a file without a header was refused since "column `0.0` stands twice", one with cells
+    /// between spaces since it has no stamps, and one with bare decimal commas as a row of the wrong
+    /// length.
+    #[test]
+    fn a_header_that_is_none_is_named_as_that() {
+        let said = refused("0.0,0.0\n0.1,0.2\n");
+        assert!(said.contains("row 1 has numbers and no names"), "{said}");
+        let said = refused("# by hand\ntime angle\n0 1\n");
+        assert!(said.contains("row 2, the header, is one cell, `time angle`"));
+        assert!(refused("t,x\n0,1,2,5\n").contains("separate cells by semicolons"));
+    }
+
+    /// Symptom: a file whose lines end with a carriage return had "no rows below its header", and a
+    /// picture was a table with rows of the wrong length.
+    #[test]
+    fn a_carriage_return_ends_a_line_and_a_picture_is_no_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("log.csv");
+        std::fs::write(&file, "t,x\r0,1\r1,2\r").unwrap();
+        let text = super::text(&file).unwrap();
+        assert_eq!(
+            numbers(&text),
+            (vec![vec![0.0, 1.0], vec![1.0, 2.0]], vec![2, 3])
+        );
+        std::fs::write(&file, b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").unwrap();
+        assert!(super::text(&file).unwrap_err().contains("is no text"));
     }
 
     #[test]

@@ -180,6 +180,13 @@ impl ColumnMapping {
                 "`name` is a sensor, ctrl.<actuator> or time; {near}"
             )));
         }
+        if self
+            .from
+            .as_ref()
+            .is_some_and(|from| from.trim().is_empty())
+        {
+            return Err(fail("`from` is empty: it is the name of a column".into()));
+        }
         if let Some(unit) = &self.unit
             && unit_factor(unit).is_none()
         {
@@ -342,6 +349,13 @@ mod tests {
                     ..base.clone()
                 },
                 "unit `parsec`",
+            ),
+            (
+                ColumnMapping {
+                    from: Some(String::new()),
+                    ..base.clone()
+                },
+                "`from` is empty",
             ),
             (
                 ColumnMapping {

@@ -9,6 +9,12 @@ use super::notes::LogNotes;
 use super::turns::Angle;
 use super::{clock, delay, orientations};
 
+/// Largest size of a number in a log.
+///
+/// Stamps in ns since 1970 are 1.8e18, more than any reading in any unit. Programs write the largest
+/// number of their type (3.4e38, 1.8e308) where they have none.
+const LARGEST: f64 = 1e20;
+
 /// A column of the log, and the conversion of its numbers to a quantity.
 #[derive(Clone, Copy, Debug)]
 struct Column {
@@ -91,8 +97,9 @@ impl<'a> Reader<'a> {
         for a in &layout.actuators {
             let (found, name) = find(&format!("ctrl.{}", a.name), None);
             let missing = || {
-                let near = near_column(&header, &name);
-                format!("has no column `{name}`, the command of an actuator{near}")
+                let near = near_column(layout, mappings, &header, &name);
+                let actuator = &a.name;
+                format!("has no column `{name}`, the command of actuator `{actuator}`{near}")
             };
             ctrl.push(found.ok_or_else(missing)?);
         }
@@ -165,10 +172,16 @@ impl<'a> Reader<'a> {
         let episode = &mut self.episode;
         let header = &self.header;
         let number = |c: usize| -> Result<f64, String> {
-            cell(c).map_err(|text| {
-                let name = &header[c];
-                format!("row {row}, column `{name}`: `{text}` is not a finite number")
-            })
+            let name = &header[c];
+            match cell(c) {
+                Ok(x) if x.abs() > LARGEST => Err(format!(
+                    "row {row}, column `{name}`: {x:e} is larger than any reading ({LARGEST:e}): leave the cell empty where nothing was read"
+                )),
+                Ok(x) => Ok(x),
+                Err(text) => Err(format!(
+                    "row {row}, column `{name}`: `{text}` is not a finite number"
+                )),
+            }
         };
         let time = number(self.time)?;
         if time.is_nan() {
@@ -221,7 +234,7 @@ impl<'a> Reader<'a> {
         }
         if episode.rows() < 2 {
             return Err(format!(
-                "has {} rows of data at different times; at least 2 are needed",
+                "rows of data at different times: {}, and at least 2 are needed",
                 episode.rows()
             ));
         }
@@ -295,9 +308,20 @@ fn hold(ctrl: &mut [f64], nu: usize, actuator: usize) -> Option<usize> {
     Some(held)
 }
 
-/// The column with the most similar name, as a question for a message.
-fn near_column(header: &[String], name: &str) -> String {
-    let near = Error::nearest(name, header.iter().map(|h| &**h));
+/// The column with the most similar name, as a question for a message. A column of another quantity
+/// is not meant.
+fn near_column(
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+    header: &[String],
+    name: &str,
+) -> String {
+    let taken = super::wanted(layout, mappings).concat();
+    let stamps = Source::of(mappings, "time", None).column;
+    let free = header
+        .iter()
+        .filter(|h| !h.is_empty() && **h != stamps && !taken.contains(h));
+    let near = Error::nearest(name, free.map(|h| &**h));
     near.map_or_else(String::new, |near| format!("; is it `{near}`?"))
 }
 

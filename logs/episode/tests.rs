@@ -355,3 +355,39 @@ fn a_column_that_stands_twice_is_refused_by_name() {
     let read = read_text(",time,ctrl.servo,angle,\n0,0,0,1,\n1,0.1,0,2,\n", &[]);
     assert!(read.is_ok(), "{read:?}");
 }
+
+/// Symptom: a command that was missing was said to be a sensor's column: "is it `pos_elbow`?"
+///
+/// Cause: the most similar of all columns was named, also one that another quantity has.
+#[test]
+fn a_missing_command_is_not_said_to_be_the_column_of_a_sensor() {
+    let from = |name: &str, from: &str| ColumnMapping {
+        from: Some(from.into()),
+        ..ColumnMapping::of(name)
+    };
+    let mappings = [from("ctrl.servo", "cmd_servo"), from("angle", "pos_servo")];
+    let said = |header: &str| {
+        let read = read_text(&format!("{header}\n0,0\n0.1,0\n"), &mappings);
+        read.unwrap_err().to_string()
+    };
+    let alone = said("time,pos_servo");
+    let expected = "has no column `cmd_servo`, the command of actuator `servo`";
+    assert!(alone.ends_with(expected), "{alone}");
+    assert!(said("time,cmd_sevro").ends_with("is it `cmd_sevro`?"));
+}
+
+/// Symptom: a reading of 1e308, which some loggers write for none, was fitted.
+#[test]
+fn a_number_larger_than_any_reading_is_refused_with_its_cell() {
+    let (header, mut rows) = (PLAIN, plain(0.0));
+    // Stamps in nanoseconds since 1970 are large, and right.
+    rows.iter_mut()
+        .for_each(|row| row[0] = 1e9 * (1.7e9 + row[0]));
+    assert!(read_text(&text(header, &rows), &[]).is_ok());
+    rows[4][2] = 1e308;
+    let said = read_text(&text(header, &rows), &[])
+        .unwrap_err()
+        .to_string();
+    let parts = ["row 6, column `angle`: 1e308", "leave the cell empty"];
+    assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+}
