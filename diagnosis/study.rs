@@ -14,6 +14,8 @@ use asid_effects::refined_model::RefinedModel;
 use asid_logs::episode::{ColumnMapping, LogNotes};
 use asid_mjcf::Plant;
 
+pub use document::named_as_written;
+
 /// Standard deviation of the noise of a task's own sensors, rad or m: the arm's repeatability, 0.1
 /// mm (Franka Emika's data sheet).
 ///

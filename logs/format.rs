@@ -47,6 +47,21 @@ impl LogFormat {
         }
     }
 
+    /// Whether the name or the contents of a path say that it is a log, and of no other kind of
+    /// file.
+    #[must_use]
+    pub fn is_named(path: &Path) -> bool {
+        if path.is_dir() {
+            let marks = ["meta/info.json", "metadata.yaml"];
+            return marks.iter().any(|mark| path.join(mark).is_file());
+        }
+        let ending = path.extension().is_some_and(|e| {
+            let known = ["csv", "tsv"];
+            known.iter().any(|k| e.eq_ignore_ascii_case(k))
+        });
+        ending || Self::of(path) != Self::Csv
+    }
+
     /// Whether rows of one table hold all columns, as in the project's own logs.
     #[must_use]
     pub fn is_table(self) -> bool {
@@ -108,5 +123,9 @@ mod tests {
         ] {
             assert_eq!(LogFormat::of(Path::new(name)), kind);
         }
+        for (name, is) in [("a.CSV", true), ("a.mcap", true), ("a.toml", false)] {
+            assert_eq!(LogFormat::is_named(Path::new(name)), is, "{name}");
+        }
+        assert!(LogFormat::is_named(folder.path()));
     }
 }

@@ -150,6 +150,7 @@ impl Study {
                 .map_err(|e| fail(format!("parameter `{}`: {e}", p.name)))?;
             p.targets.iter_mut().for_each(|t| by_geom(&plant, t));
         }
+        set_once(&parameters).map_err(&fail)?;
         document.check_noise(&plant.layout, &fail)?;
         document.check_columns(&plant, &fail)?;
         let mut notes = Vec::new();
@@ -213,6 +214,39 @@ fn named(plant: &Plant, target: &Target) -> Result<()> {
         return Ok(());
     }
     Err(Error::unknown(kind, &target.name, names))
+}
+
+/// Refuses two parameters that set one value, under one name or under two.
+fn set_once(parameters: &[Parameter]) -> Result<(), String> {
+    for (i, p) in parameters.iter().enumerate() {
+        let same = |q: &&Parameter| p.targets.iter().any(|t| q.targets.contains(t));
+        if let Some(q) = parameters[..i].iter().find(same) {
+            return Err(format!(
+                "parameters `{}` and `{}` set the same value of the model: leave one of them out",
+                q.name, p.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Names a study's parameter in an error about one of its targets.
+///
+/// The target may have a name that the study does not mention, as a geom's for the mass of its
+/// body.
+#[must_use]
+pub fn named_as_written(parameters: &[Parameter], error: Error) -> Error {
+    match error {
+        Error::Parameter { parameter, message } => {
+            let is_it = |p: &&Parameter| p.targets.iter().any(|t| t.to_string() == parameter);
+            let written = parameters.iter().find(is_it);
+            Error::Parameter {
+                parameter: written.map_or(parameter, |p| p.name.clone()),
+                message,
+            }
+        }
+        other => other,
+    }
 }
 
 /// Replaces the mass of a body by the mass of its geom, if a single geom has it.

@@ -138,3 +138,36 @@ fn a_mapping_whose_column_no_log_has_is_refused_in_one_line() {
     assert!(said.contains("no log has a column `joint`"), "{said}");
     assert!(said.contains("study.toml") && said.lines().count() == 1);
 }
+
+/// Symptom: an error about the mass of a body named `geom/…`, which the study does not mention; of
+/// two parameters for one mass it said "is named twice".
+///
+/// Cause: the mass of a body with a single geom is set by that geom, and messages have the name of
+/// what is set.
+#[test]
+fn the_mass_of_a_body_is_named_in_errors_as_the_study_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), &[]);
+    let file = folder.path().join("study.toml");
+    let scene = SCENE.replace("<geom size", "<geom name=\"ball\" size");
+    std::fs::write(folder.path().join("m.xml"), scene).unwrap();
+    let text = std::fs::read_to_string(&file).unwrap();
+    let parameter = |name: &str, target: &str| {
+        format!("[[parameter]]\nname = \"{name}\"\ntarget = \"{target}\"\nrange = [0.5, 2]\n")
+    };
+    let body = parameter("load", "body/b/mass");
+    std::fs::write(&file, format!("{text}{body}")).unwrap();
+    let parameters = Study::read(folder.path()).unwrap().parameters;
+    let of_engine = Error::Parameter {
+        parameter: parameters[0].targets[0].to_string(),
+        message: "-1 must be above 0".into(),
+    };
+    assert!(of_engine.to_string().contains("geom/ball"), "{of_engine}");
+    let said = named_as_written(&parameters, of_engine).to_string();
+    assert_eq!(said, "parameter `load`: -1 must be above 0");
+    let geom = parameter("ball", "geom/ball/mass");
+    std::fs::write(&file, format!("{text}{body}{geom}")).unwrap();
+    let said = Study::read(folder.path()).unwrap_err().to_string();
+    let expected = "parameters `load` and `ball` set the same value";
+    assert!(said.contains(expected), "{said}");
+}

@@ -28,6 +28,7 @@ mod run;
 pub mod schemas;
 mod session;
 mod settings;
+mod shell;
 mod solve;
 mod stage;
 mod trace;

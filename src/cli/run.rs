@@ -134,15 +134,5 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
 
 /// The command line of this process, quoted where necessary.
 pub fn command_line() -> String {
-    std::iter::once("asid".to_owned())
-        .chain(std::env::args().skip(1).map(|a| {
-            let plain = |c: char| c.is_ascii_alphanumeric() || "-_=./,:@+".contains(c);
-            if !a.is_empty() && a.chars().all(plain) {
-                a
-            } else {
-                format!("'{}'", a.replace('\'', r"'\''"))
-            }
-        }))
-        .collect::<Vec<_>>()
-        .join(" ")
+    super::shell::line(std::iter::once("asid".to_owned()).chain(std::env::args().skip(1)))
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use asid_core::{Backend, Episode, Error, Model};
-use asid_diagnosis::study::Study;
+use asid_diagnosis::study::{Study, named_as_written};
 use asid_effects::RefinedModel;
 use asid_effects::refined::as_compiled;
 use asid_mjcf::Plant;
@@ -15,6 +15,7 @@ use asid_sysid::start::start_of;
 use super::super::diagnose::default_backend;
 use super::super::model::refine;
 use super::super::session::backend;
+use super::named::model_of;
 
 /// A machine on an engine.
 pub struct Subject {
@@ -35,14 +36,16 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// Opens a study (a folder, or a TOML file with `train`), a refined model (any other TOML file)
-    /// or an MJCF file.
+    /// Opens a study (a folder, or a TOML file with `train`), a refined model (any other TOML file,
+    /// or the folder of a result) or an MJCF file.
     pub fn open(path: &Path, engine: Option<&str>) -> Result<Self> {
         Self::open_with(path, engine, None)
     }
 
     /// As [`Subject::open`], with another `model` in place of the study's own.
     pub fn open_with(path: &Path, engine: Option<&str>, model: Option<&Path>) -> Result<Self> {
+        let path = model_of(path);
+        let path = &*path;
         let study = is_study(path)?.then(|| Study::read_with(path, model));
         let mut study = study.transpose()?;
         let (name, file, source) = match &study {
@@ -92,6 +95,15 @@ impl Subject {
         self.study
             .as_ref()
             .ok_or_else(|| no_study(&self.file).into())
+    }
+
+    /// An error about an unknown of the study, with the name that the study gives it.
+    pub fn as_written(&self, error: impl Into<anyhow::Error>) -> anyhow::Error {
+        let parameters = self.study.as_ref().map_or(&[][..], |s| &s.parameters);
+        match error.into().downcast::<Error>() {
+            Ok(error) => named_as_written(parameters, error).into(),
+            Err(other) => other,
+        }
     }
 
     /// `name version` of the engine.
