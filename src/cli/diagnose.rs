@@ -12,9 +12,10 @@ use anyhow::Result;
 use asid_core::{Backend, Target};
 use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
-use asid_diagnosis::study::Study;
+use asid_diagnosis::study::{Study, named_as_written};
 use asid_effects::refined_model::RefinedModel;
 use asid_mjcf::Plant;
+use asid_mjcf::native::way;
 use asid_report::diagnosis::page;
 use asid_results::diagnosis::{NotTried, RealWorld};
 use asid_results::trace::{DiagnosisTrace, NamedText};
@@ -173,7 +174,8 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     };
     let machine = machine(&study, &config.backend, common.threads.unwrap_or(0))?;
     progress.watch()?;
-    let (mut diagnosis, work) = diagnose_study(&study, machine, config.settings(), &progress)?;
+    let (mut diagnosis, work) = diagnose_study(&study, machine, config.settings(), &progress)
+        .map_err(|e| named_as_written(&study.parameters, e))?;
     let mut experiments = None;
     if let (Some(world), Some(n @ 1..)) = (&world, config.experiments)
         && !progress.is_interrupted()
@@ -247,7 +249,7 @@ fn write(
         write_text(&folder.join("config.toml"), &toml::to_string(settings)?)?;
         write_text(
             &folder.join("refined.toml"),
-            &refined(study, diagnosis, folder)?,
+            &refined((study, &out.path()), diagnosis, folder)?,
         )?;
         if let Some(commands) = &diagnosis.next_commands {
             commands.write_csv(&folder.join(&next))?;
@@ -289,15 +291,17 @@ fn tell_origin(trace: &mut DiagnosisTrace, engine: &str, seed: u64) {
     ]);
 }
 
-/// The text of the refined model. Its document is copied beside it if it needs no other file.
-fn refined(study: &Study, diagnosis: &Diagnosis, folder: &Path) -> Result<String> {
+/// The text of the refined model, whose final folder is `home`.
+///
+/// Its document is copied beside it into `folder` if it needs no other file. Else it is named by
+/// its path from `home`.
+fn refined((study, home): (&Study, &Path), diagnosis: &Diagnosis, folder: &Path) -> Result<String> {
     let alone = !study.scene.xml().contains("file=");
     let model = if alone {
         write_text(&folder.join("model.xml"), study.scene.xml())?;
         PathBuf::from("model.xml")
     } else {
-        let path = PathBuf::from(study.scene.name());
-        path.canonicalize().unwrap_or(path)
+        way(home, Path::new(study.scene.name()))
     };
     let mut values: Vec<(Target, f64)> = study.fixed.clone();
     for (parameter, value) in study.parameters.iter().zip(&diagnosis.values) {

@@ -89,6 +89,26 @@ fn a_study_is_identified_and_its_refined_model_exported() {
     assert_eq!(again["parameters"], result["parameters"]);
 }
 
+/// Symptom: the result of a study that was moved with it did not find its model, and `asid export`
+/// of its folder asked for a study.toml.
+///
+/// Cause: `refined.toml` named the document by its absolute path, and a folder was always a study.
+#[test]
+fn a_study_and_its_result_can_be_moved_together() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    ok(&place, &["identify", "cart", "--quiet", "--out", "fit"]);
+    std::fs::create_dir(place.path("moved")).unwrap();
+    for name in ["cart", "fit"] {
+        let to = place.path("moved").join(name);
+        std::fs::rename(place.path(name), to).unwrap();
+    }
+    let refined = place.read("moved/fit/refined.toml");
+    assert!(refined.contains("../cart/nominal.xml"), "{refined}");
+    let said = ok(&place, &["export", "moved/fit", "--out", "plain.xml"]);
+    assert!(said.contains("wrote plain.xml: 1 value;"), "{said}");
+}
+
 #[test]
 fn a_study_is_fitted_in_another_model_that_takes_the_place_of_its_own() {
     let place = Workplace::new();

@@ -70,13 +70,18 @@ pub fn explore(
     let engine = config.backend.as_deref();
     let subject = Subject::open_with(path, engine, config.model.as_deref())?;
     let subject = sensors::with_sensors(subject, &mut notes)?;
-    let mut setup = Setup::new(&subject, &config, common.threads.unwrap_or(0))?;
+    let mut setup = Setup::new(&subject, &config, common.threads.unwrap_or(0))
+        .map_err(|e| subject.as_written(e))?;
     notes.append(&mut setup.notes);
     let method = Method::named(&config.explorer)?;
     let objective: Objective = config.objective.parse()?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", subject.name))?;
     interrupt::watch(&format!("the search for a motion of {}", subject.name))?;
-    let found = setup.design(&config, method, config.seed, &Bars::new(common.quiet))?;
+    let bars = Bars::new(common.quiet);
+    let found = setup
+        .design(&config, method, config.seed, &bars)
+        .map_err(|e| subject.as_written(e))?;
+    setup.refuse_standstill(&found)?;
     let period = setup.period();
     let frames = found.commands.len() / setup.base.len().max(1);
     let (unknowns, nuisance) = setup.parameters.split_at(setup.sought);

@@ -9,6 +9,7 @@ use asid_core::posterior::Direction;
 use asid_core::{Parameter, Streams, Target};
 use asid_diagnosis::intake::Intake;
 use asid_effects::RefinedModel;
+use asid_mjcf::native::way;
 use asid_report::run::{NamedText, RealWorld, RunReport};
 use asid_sysid::dataset::Dataset;
 use asid_sysid::fit::{Identified, fit, smooth};
@@ -138,7 +139,8 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         (&config.gauss_newton, Streams::new(config.seed)),
         threads,
         &progress,
-    )?;
+    )
+    .map_err(|e| subject.as_written(e))?;
     let measure = |parameters: &[Parameter], values: &[f64], data: &Dataset| {
         gap(&*subject.model, parameters, values, data, threads).map(|g| g.value)
     };
@@ -195,7 +197,7 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         write_json(&folder.join("posterior.json"), &found.posterior)?;
         write_text(
             &folder.join("refined.toml"),
-            &refined(&subject, &study.parameters, &found)?,
+            &refined((&subject, &out.path()), &study.parameters, &found)?,
         )?;
         for (kind, logs) in [("train", &study.train), ("test", &study.test)] {
             for (i, (_, episode)) in logs.iter().enumerate() {
@@ -238,8 +240,13 @@ fn widen(name: &str) -> String {
     format!("give `{name}` a wider `range` in [[parameter]] of the study")
 }
 
-/// The model with the fitted values.
-fn refined(subject: &Subject, parameters: &[Parameter], found: &Identified) -> Result<String> {
+/// The model with the fitted values, as a file in the folder `home` that finds its document when
+/// both have moved together.
+fn refined(
+    (subject, home): (&Subject, &Path),
+    parameters: &[Parameter],
+    found: &Identified,
+) -> Result<String> {
     let mut values: Vec<(Target, f64)> = subject.source.parameters.clone();
     for (parameter, value) in parameters.iter().zip(&found.values) {
         for target in &parameter.targets {
@@ -247,8 +254,7 @@ fn refined(subject: &Subject, parameters: &[Parameter], found: &Identified) -> R
             values.push((target.clone(), parameter.setting(*value)));
         }
     }
-    let file = std::path::PathBuf::from(subject.source.scene.name());
-    let file = file.canonicalize().unwrap_or(file);
+    let file = way(home, Path::new(subject.source.scene.name()));
     // An effect keeps its own values.
     let mut effects = subject.source.effects.clone();
     values.retain(|(target, value)| {

@@ -8,7 +8,7 @@ use asid_core::registry::{TaskEntry, find};
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
 
-use super::super::super::machine::{is_study, no_study};
+use super::super::super::machine::{is_study, missing, no_study, refuse_log};
 use super::super::super::model::{self, Needs};
 use super::super::super::session::backend;
 use super::super::super::settings::{difficulty, wrong};
@@ -18,8 +18,12 @@ impl Config {
     /// The study: as written, or of a task with the logs that the settings name or with `played`.
     pub fn study(&self, played: Option<Logs>) -> Result<Study> {
         match (&self.study, &self.task) {
+            (Some(path), _) if !path.exists() => Err(missing(path).into()),
             (Some(path), _) if is_model(path)? => Err(no_study(path).into()),
-            (Some(path), _) => Ok(Study::read_with(path, self.model.as_deref())?),
+            (Some(path), _) => {
+                refuse_log(path, self.model.as_deref())?;
+                Ok(Study::read_with(path, self.model.as_deref())?)
+            }
             (None, Some(name)) => {
                 let task = difficulty::at((find::<TaskEntry>(name)?.make)()?, &self.difficulty)?;
                 let model = match &self.model {
