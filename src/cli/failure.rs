@@ -2,8 +2,11 @@
 
 use std::io::Write as _;
 use std::panic::AssertUnwindSafe;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
+
+use asid_logs::LogFormat;
 
 /// Exit status when the work failed.
 const FAILED: u8 = 1;
@@ -28,9 +31,22 @@ pub fn usage(error: &clap::Error) -> ExitCode {
             ExitCode::from(WRONG_CALL)
         }
         _ => {
-            tell(&usage_line(&error.to_string()));
+            tell(&(usage_line(&error.to_string()) + &about_logs(error)));
             ExitCode::from(WRONG_CALL)
         }
+    }
+}
+
+/// Adds to the message about a further argument that is a log what logs are given to.
+fn about_logs(error: &clap::Error) -> String {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    match (error.kind(), error.get(ContextKind::InvalidArg)) {
+        (ErrorKind::UnknownArgument, Some(ContextValue::String(argument)))
+            if LogFormat::is_named(Path::new(argument)) =>
+        {
+            "; logs become a study by: asid import LOG… --model FILE --out DIR".into()
+        }
+        _ => String::new(),
     }
 }
 
@@ -57,11 +73,40 @@ pub fn report(error: &anyhow::Error) -> ExitCode {
     if error.downcast_ref::<std::io::Error>().is_some_and(closed) {
         return ExitCode::SUCCESS;
     }
-    tell(&one_line(&format!("{error:#}")));
+    let given: Vec<String> = std::env::args().collect();
+    tell(&one_line(&as_given(error, &given)));
     match error.downcast_ref::<asid_core::Error>() {
         Some(e) if e.is_usage() => ExitCode::from(WRONG_CALL),
         _ => ExitCode::from(FAILED),
     }
+}
+
+/// The text of an error. A setting has the name of the option if it is one of `arguments`, and an
+/// option has no other heading.
+fn as_given(error: &anyhow::Error, arguments: &[String]) -> String {
+    let whole = format!("{error:#}");
+    let Some(asid_core::Error::Config { key, message }) = error.downcast_ref() else {
+        return whole;
+    };
+    let is_given = |option: &String| {
+        let follows = |rest: &str| rest.is_empty() || rest.starts_with('=');
+        let mut given = arguments.iter();
+        given.any(|argument| argument.strip_prefix(&**option).is_some_and(follows))
+    };
+    let options = key.split(", ").map(|key| match key.starts_with("--") {
+        true => key.to_owned(),
+        false => format!("--{}", key.replace('_', "-")),
+    });
+    let given: Vec<String> = options.filter(is_given).collect();
+    let named = match &given[..] {
+        [] if key.starts_with("--") => key.clone(),
+        [] => return whole,
+        given => given.join(", "),
+    };
+    whole.replace(
+        &format!("config {key}: {message}"),
+        &format!("{named}: {message}"),
+    )
 }
 
 /// Prints a warning, which stops nothing.
@@ -153,6 +198,31 @@ mod tests {
         assert_eq!(
             one_line("column `\u{1b}[31m`\nis é"),
             "column `\\u{1b}[31m` is é"
+        );
+    }
+
+    /// Symptom: `--limit-position elbow:1:0` was refused as "config limit_position", a key of a file
+    /// that the user never wrote. Cause: a message names a setting by its key, wherever it is given.
+    #[test]
+    fn a_setting_that_an_option_gives_is_named_as_the_option() {
+        let error = |key: &str| {
+            anyhow::Error::from(asid_core::Error::Config {
+                key: key.into(),
+                message: "1 is not below 0".into(),
+            })
+        };
+        let given = |key: &str, arguments: &[&str]| {
+            let arguments: Vec<String> = arguments.iter().map(|&a| a.to_owned()).collect();
+            as_given(&error(key), &arguments)
+        };
+        let (key, several) = ("limit_position", "limit_speed, limit_position");
+        let option = "--limit-position: 1 is not below 0";
+        assert_eq!(given(key, &["--limit-position", "elbow:1:0"]), option);
+        assert_eq!(given(several, &["--limit-position=elbow:1:0"]), option);
+        assert_eq!(given("--limit-position", &[]), option);
+        assert_eq!(
+            given(key, &["--limit-positions"]),
+            "config limit_position: 1 is not below 0"
         );
     }
 

@@ -8,6 +8,7 @@ use anyhow::Result;
 use asid_core::real_world::Attempt;
 use asid_core::registry::{SolverEntry, find};
 use asid_core::{Control, Episode, Error, Posterior, Rollout};
+use asid_results::naming::joined;
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Simulator, Worlds};
@@ -16,7 +17,7 @@ use super::result::{CostResult, ParameterResult, SCHEMA, Versions};
 use super::session::Session;
 use super::settings::Stage;
 use super::stage::{self, Named};
-use super::{interrupt, trace};
+use super::{interrupt, shell, trace};
 
 /// The name of the prior in place of a folder.
 const PRIOR: &str = "prior";
@@ -133,7 +134,7 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         format!("start: {}", stage::start_line(&session)),
         format!(
             "action: {}; expected {} {:.2}, success in {:.0} % of {} simulated tries",
-            chosen.join(", "),
+            joined(&chosen, "and"),
             expected.metric,
             expected.value,
             100.0 * expected.success_rate,
@@ -210,9 +211,9 @@ fn belief(session: &Session, from: &Path) -> Result<Posterior> {
     if theirs != ours {
         return Err(fail(format!(
             "is over {}, the task's unknowns here are {}; `--config {}` brings the settings it was made with",
-            theirs.join(", "),
-            ours.join(", "),
-            from.join("config.toml").display()
+            joined(&theirs, "and"),
+            joined(&ours, "and"),
+            shell::quoted(&from.join("config.toml").display().to_string())
         ))
         .into());
     }

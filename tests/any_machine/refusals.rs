@@ -101,16 +101,16 @@ fn what_is_wrong_is_told_in_one_line() {
         ),
         (
             vec!["explore", "cart", "--limit-position", "rail:1:0"],
-            "limit_position: position of `rail`: 1 is not below 0",
+            "asid: --limit-position: position of `rail`: 1 is not below 0",
         ),
         (
             vec!["explore", "cart", "--set", "second=3"],
-            "--config, --set: unknown field `second`",
+            "asid: --set: unknown field `second`",
         ),
         // The cart begins at 0.
         (
             vec!["explore", "cart", "--limit-position", "rail:0.1:1"],
-            "limit_box: the machine begins beyond one: position of `rail` 0.000, 0.100 beyond its limit of 0.100 to 1.000",
+            "asid: --limit-position: the machine begins beyond one: position of `rail` 0.000, 0.100 beyond its limit of 0.100 to 1.000",
         ),
         (
             vec!["explore", "cart", "--explorer", "chance"],

@@ -16,15 +16,19 @@ use signal_hook::iterator::Signals;
 
 use crate::cli::failure;
 use crate::cli::interrupt::INTERRUPTED;
+use crate::cli::shell;
 
 /// Exit status after SIGTERM: the work is not finished.
 const STOPPED: i32 = 1;
 
 /// Text that says how to resume a comparison, or a share of it.
 pub fn how_to_go_on(out: &Path, shard: Option<Shard>) -> String {
-    let out = out.display();
-    let share = shard.map_or(String::new(), |s| format!(" --shard {s}"));
-    format!("`asid compare --config {out}/config.toml --out {out}{share}` goes on with it")
+    let settings = out.join("config.toml").display().to_string();
+    let out = out.display().to_string();
+    let command = ["asid", "compare", "--config", &settings, "--out", &out].map(str::to_owned);
+    let share = shard.map(|s| ["--shard".to_owned(), s.to_string()]);
+    let command = shell::line(command.into_iter().chain(share.into_iter().flatten()));
+    format!("`{command}` goes on with it")
 }
 
 /// The comparison to stop: the line that says how to resume it, and the flag that stops new cells.

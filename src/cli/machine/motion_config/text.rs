@@ -1,6 +1,7 @@
 //! Names and numbers separated by colons, as in options and settings.
 
 use anyhow::Result;
+use asid_results::naming::count;
 
 use crate::cli::settings::wrong;
 
@@ -15,7 +16,10 @@ pub fn name_and<const N: usize>(key: &str, text: &str) -> Result<(String, [f64; 
     let form = || {
         wrong(
             key,
-            format!("`{text}` is not a name and {N} numbers, with colons between"),
+            format!(
+                "`{text}` is not a name and {}, with colons between",
+                count(N, "number")
+            ),
         )
     };
     let Some((name, numbers)) = parts.split_last().filter(|(_, n)| n.len() == N) else {
