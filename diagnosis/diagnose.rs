@@ -1,6 +1,7 @@
 //! A diagnosis from a study to its result.
 
 use asid_core::{Episode, Error, Layout, Progress, Result};
+use asid_results::naming::count;
 
 use crate::calibration::calibrate;
 use crate::intake::Intake;
@@ -103,7 +104,10 @@ pub fn diagnose(
 ///
 /// In the latter an initial state fits the readings whatever the machine is, and the absence of a
 /// gap means nothing.
-fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
+///
+/// # Errors
+/// [`Error::Config`] for such logs; the message names the study.
+pub fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
     let logs = study.train.len();
     let rows: usize = study.train.iter().map(|(_, e)| e.rows()).sum();
     let finite = |e: &Episode| e.readings.iter().filter(|x| x.is_finite()).count();
@@ -111,12 +115,14 @@ fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
     let open = open_coordinates(layout, study).len();
     let message = if rows < FEWEST_ROWS * logs {
         format!(
-            "have {rows} rows in all, too little to tell anything: each needs {FEWEST_ROWS} at least"
+            "{} in all, too little to tell anything: each needs {FEWEST_ROWS} at least",
+            count(rows, "row")
         )
     } else if readings <= open * logs {
         format!(
-            "have {readings} readings in all, too little to tell anything: more than the {open} coordinates of each start that are unknown are needed \
-             of each"
+            "{} in all, too little to tell anything: each needs more than the {} of its start",
+            count(readings, "reading"),
+            count(open, "unknown coordinate")
         )
     } else {
         return Ok(());
@@ -124,8 +130,9 @@ fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
     Err(Error::Config {
         key: "train".into(),
         message: format!(
-            "study {}: {logs} logs to fit to {message}; log longer episodes",
-            study.name
+            "study {}: {} to fit to, {message}; log longer episodes",
+            study.name,
+            count(logs, "log")
         ),
     })
 }

@@ -3,6 +3,7 @@
 mod files;
 mod opened;
 mod page;
+mod remarks;
 mod table;
 mod wired;
 
@@ -11,11 +12,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::{Episode, Error};
+use asid_diagnosis::study::Study;
 use asid_logs::counted::check_units;
 use asid_logs::episode::{ColumnMapping, LogNotes, angles, of_table, read_as, wanted};
 use asid_logs::propose::{Proposal, propose};
 use asid_logs::{LogFormat, LogSettings, Numberless, RawLog};
 use asid_mjcf::Plant;
+use asid_results::naming::joined;
 
 use super::failure;
 use super::machine::{Subject, sensors};
@@ -25,7 +28,7 @@ use opened::{Opened, open};
 /// Arguments of `import`.
 #[derive(clap::Args)]
 #[command(after_help = "\
-A log is a CSV file of any names, or, in a build with --features logs, an MCAP file with messages of ROS 2 or JSON, a bag of \
+A log is a CSV file of any names (or a folder of such files), or, in a build with --features logs, an MCAP file with messages of ROS 2 or JSON, a bag of \
 ROS 2 (a folder, or a file of SQLite), a LeRobot dataset of version 2 or 3 (all its episodes, or one as DATASET#3), or a \
 Parquet file.
 
@@ -139,6 +142,12 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     }
     check_units(&subject.plant, &proposal.mappings())?;
     let mut imported = episodes(raw, &subject, &proposal)?;
+    let written = wired::study(&subject, &imported, &proposal);
+    let written = Study {
+        train: fitted(&imported),
+        ..written
+    };
+    remarks::refuse_short(&written, &subject.plant, &imported)?;
     let turns = imported.iter().flat_map(|one| one.turns.clone()).collect();
     let counted = LogNotes {
         turns,
@@ -150,6 +159,7 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     }
     let found = wired::look(&subject, &mut imported, &mut proposal, &whole)?;
     notes.extend(found);
+    notes.extend(remarks::remarks(&imported, &proposal));
     let study = files::Files {
         subject: &subject,
         given: &arguments.model,
@@ -169,18 +179,20 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     table::show(&proposal, whole.stamps.as_deref())?;
     notes.iter().for_each(|note| failure::note(note));
     let mut stdout = std::io::stdout().lock();
-    match out {
-        Some(out) => writeln!(
-            stdout,
-            "wrote {}: {} episodes, {} of them held out; look at import.html, then: asid diagnose {}",
-            out.path().display(),
-            study.count(),
-            study.held_out(),
-            out.path().display()
-        )?,
-        None => writeln!(stdout, "nothing is written without --out DIR")?,
-    }
-    Ok(())
+    let written = match out {
+        Some(out) => study.written(&out.path()),
+        None => "nothing is written without --out DIR".into(),
+    };
+    Ok(writeln!(stdout, "{written}")?)
+}
+
+/// The episodes that a study of these logs fits, by the paths of their logs.
+fn fitted(imported: &[Imported]) -> Vec<(String, Episode)> {
+    let all = files::episodes(imported).into_iter().enumerate();
+    let fitted = all.filter(|(_, (_, held))| !held);
+    fitted
+        .map(|(i, (episode, _))| (i.to_string(), episode))
+        .collect()
 }
 
 fn given(map: &[String]) -> Result<Vec<(String, String)>> {
@@ -189,6 +201,13 @@ fn given(map: &[String]) -> Result<Vec<(String, String)>> {
             key: "--map".into(),
             message: format!("`{text}` is not NAME=COLUMN, such as ctrl.elbow=/arm/target.data.1"),
         })?;
+        if name.is_empty() || column.is_empty() {
+            return Err(Error::Config {
+                key: "--map".into(),
+                message: format!("`{text}` lacks a name: NAME=COLUMN has one on either side"),
+            }
+            .into());
+        }
         Ok((name.to_owned(), column.to_owned()))
     };
     let all: Vec<(String, String)> = map.iter().map(one).collect::<Result<_>>()?;
@@ -225,7 +244,7 @@ fn complete(proposal: &Proposal, log: &RawLog) -> Result<()> {
         [first, ..] => {
             return refuse(format!(
                 "no column is the command of the actuators {}; a diagnosis needs what was sent: name each, such as --map ctrl.{first}=COLUMN",
-                quoted.join(", ")
+                joined(&quoted, "and")
             ));
         }
     }

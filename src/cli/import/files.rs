@@ -4,20 +4,22 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use asid_core::Error;
+use asid_core::{Episode, Error};
 use asid_effects::native::plain;
 use asid_logs::LogSettings;
 use asid_logs::episode::ColumnMapping;
 use asid_logs::propose::Proposal;
 use asid_mjcf::native::way;
+use asid_results::naming::count;
 use serde::Serialize;
 
 use super::super::machine::Subject;
 use super::super::output::write_text;
+use super::super::shell;
 use super::Imported;
 
 /// Number of parts into which a single episode is cut; the last part is held out.
-const PARTS: usize = 3;
+pub(super) const PARTS: usize = 3;
 
 /// What to write.
 pub(super) struct Files<'a> {
@@ -71,6 +73,17 @@ impl Files<'_> {
         } else {
             self.imported.iter().filter(|i| i.test).count()
         }
+    }
+
+    /// What was written into the folder `home`, and the command that goes on with it.
+    pub(super) fn written(&self, home: &Path) -> String {
+        let home = home.display().to_string();
+        format!(
+            "wrote {home}: {}, {} of them held out; look at import.html, then: {}",
+            count(self.count(), "episode"),
+            self.held_out(),
+            shell::line(["asid", "diagnose", &home])
+        )
     }
 
     /// Writes the files into `folder`, whose final path is `home`.
@@ -132,26 +145,24 @@ impl Files<'_> {
     fn copies(&self, folder: &Path) -> Result<(Vec<String>, Vec<String>)> {
         let (mut train, mut test) = (Vec::new(), Vec::new());
         let layout = &self.subject.plant.layout;
-        if self.is_cut() {
-            let episode = &self.imported[0].episode;
-            for part in 0..PARTS {
-                let rows = episode.rows() * part / PARTS..episode.rows() * (part + 1) / PARTS;
-                let held = part + 1 == PARTS;
-                let name = format!("{}_{part}.csv", if held { "test" } else { "train" });
-                let part = episode.part(rows);
-                part.write_csv_with_start(&folder.join(&name), layout)?;
-                if held { &mut test } else { &mut train }.push(name);
-            }
-            return Ok((train, test));
-        }
-        for (i, one) in self.imported.iter().enumerate() {
-            let name = format!("{}_{i}.csv", if one.test { "test" } else { "train" });
-            let path = folder.join(&name);
-            one.episode.write_csv_with_start(&path, layout)?;
-            if one.test { &mut test } else { &mut train }.push(name);
+        for (i, (episode, held)) in episodes(self.imported).iter().enumerate() {
+            let name = format!("{}_{i}.csv", if *held { "test" } else { "train" });
+            episode.write_csv_with_start(&folder.join(&name), layout)?;
+            if *held { &mut test } else { &mut train }.push(name);
         }
         Ok((train, test))
     }
+}
+
+/// The episodes of the study, each with whether it is held out: a single one is cut into parts.
+pub(super) fn episodes(imported: &[Imported]) -> Vec<(Episode, bool)> {
+    if let [Imported { episode, .. }] = imported {
+        let end = |part: usize| episode.rows() * part / PARTS;
+        let part = |k: usize| (episode.part(end(k)..end(k + 1)), k + 1 == PARTS);
+        return (0..PARTS).map(part).collect();
+    }
+    let all = imported.iter();
+    all.map(|one| (one.episode.clone(), one.test)).collect()
 }
 
 /// The path to a log from the study, with the episode of a dataset.

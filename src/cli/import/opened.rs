@@ -23,6 +23,7 @@ pub(super) fn open(
 ) -> Result<(Vec<Opened>, LogSettings)> {
     let mut opener = Opener::default();
     let mut all: Vec<Opened> = Vec::new();
+    let (fitted, held_out) = (tables_of(fitted), tables_of(held_out));
     let each = fitted.iter().map(|p| (p, false));
     for (path, test) in each.chain(held_out.iter().map(|p| (p, true))) {
         if path.to_str().is_none() {
@@ -58,6 +59,31 @@ pub(super) fn open(
     Ok((all, settings))
 }
 
+/// The logs at some paths, in order. A folder of tables, which is no log of its own, stands for
+/// them, by name.
+fn tables_of(paths: &[PathBuf]) -> Vec<PathBuf> {
+    let of = |path: &PathBuf| {
+        let tables = tables_in(path).filter(|tables| !tables.is_empty());
+        tables.unwrap_or_else(|| vec![path.clone()])
+    };
+    paths.iter().flat_map(of).collect()
+}
+
+/// The tables in a folder, sorted by name; `None` if it is a log itself, or no folder.
+fn tables_in(path: &Path) -> Option<Vec<PathBuf>> {
+    if !path.is_dir() || LogFormat::is_named(path) {
+        return None;
+    }
+    let entries = std::fs::read_dir(path).ok()?;
+    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let files: Vec<PathBuf> = files.filter(|file| file.is_file()).collect();
+    let is_log = |file: &&PathBuf| LogFormat::is_named(file);
+    let mut tables: Vec<PathBuf> = files.iter().filter(is_log).cloned().collect();
+    tables.sort();
+    let all = tables.iter().all(|file| LogFormat::of(file).is_table());
+    all.then_some(tables)
+}
+
 /// Refuses a log that is already in the list, whatever path names it. It would be both fitted and
 /// held out, or counted twice.
 fn refuse_twice(all: &[Opened], own: &Path, test: bool) -> Result<()> {
@@ -84,4 +110,24 @@ fn failed(path: &Path, message: &str) -> anyhow::Error {
         message: message.to_owned(),
     };
     error.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: `asid import logs` of a folder of CSV files said "is a folder without meta/info.json".
+    #[test]
+    fn a_folder_of_tables_stands_for_them_and_a_bag_for_itself() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for name in ["b.csv", "a.csv", "notes.txt"] {
+            std::fs::write(path(name), "").unwrap();
+        }
+        let whole = folder.path().to_owned();
+        let found = tables_of(&[whole.clone(), path("c.csv")]);
+        assert_eq!(found, [path("a.csv"), path("b.csv"), path("c.csv")]);
+        std::fs::write(path("metadata.yaml"), "").unwrap();
+        assert_eq!(tables_of(&[whole.clone()]), [whole]);
+    }
 }

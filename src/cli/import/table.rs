@@ -4,6 +4,7 @@ use std::io::Write as _;
 
 use anyhow::Result;
 use asid_logs::propose::{Match, Proposal};
+use asid_report::number::significant;
 use serde::Serialize;
 
 use super::super::output::OutFolder;
@@ -56,10 +57,22 @@ pub(super) fn cells(found: &Match) -> [String; 5] {
     [
         mapping.from.clone().unwrap_or_else(|| found.name.clone()),
         reading(found),
-        format!("{:.0}", found.rate),
+        rate(found.rate),
         format!("{} to {}", figure(low), figure(high)),
         found.reasons.join(", "),
     ]
+}
+
+/// Rate from which on it is told in whole Hz: two digits are enough to see a wrong unit.
+const WHOLE: f64 = 10.0;
+
+/// Text of a rate, Hz.
+fn rate(rate: f64) -> String {
+    if rate >= WHOLE {
+        format!("{rate:.0}")
+    } else {
+        significant(rate, 2)
+    }
 }
 
 /// Largest number of columns that are named; the rest is counted.

@@ -30,7 +30,7 @@ struct Lines {
 }
 
 /// The episodes as a study.
-fn study(subject: &Subject, imported: &[Imported], proposal: &Proposal) -> Study {
+pub(super) fn study(subject: &Subject, imported: &[Imported], proposal: &Proposal) -> Study {
     let source = &subject.source;
     let logs = |test: bool| -> Vec<(String, Episode)> {
         let own = imported.iter().filter(|i| i.test == test);
