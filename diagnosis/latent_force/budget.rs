@@ -64,7 +64,7 @@ pub fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     walks.iter().map(part).collect()
 }
 
-/// Refuses logs of whose rows the budget holds fewer than [`USABLE`].
+/// Refuses logs of whose rows the budget holds fewer than `USABLE`.
 ///
 /// # Errors
 /// When there is one; the message names it and says how far its rows are apart.

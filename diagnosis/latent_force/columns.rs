@@ -25,7 +25,6 @@ use crate::candidate::Candidate;
 use super::context::{Context, PUSH};
 use super::estimate::Estimate;
 use super::fit::Hypothesis;
-use super::half_step::HalfStep;
 use super::one_step::one_step_tells;
 use super::step_error::beside;
 use super::step_map::{Derivatives, LinearEpisode};
@@ -171,10 +170,8 @@ impl Columns {
         )?);
         let (want, steps) = slopes_wanted(context);
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
-        if let Some(mut finer) = HalfStep::of(context, base)? {
-            finer.error(theta)?.join(&mut linear, asked.base);
-        }
-        asked.add_step_error(context);
+        context.step_error.join(&mut linear, asked.base);
+        asked.add_step_error(&context.step_error);
         let assigned = linear.iter_mut().map(|l| std::mem::take(&mut l.assigned));
         let assigned: Vec<_> = assigned.collect();
         let slopes = linear.iter_mut().map(ForceSlopes::take);

@@ -10,12 +10,11 @@ use crate::machine::Machine;
 use crate::predict::State;
 
 use super::estimate::Estimate;
-use super::half_step::Finer;
 use super::initial::{open_by_reading, position_noise, start, start_of_segment};
 use super::islands::Islands;
 use super::one_step::both_ways;
 use super::smoother::{NoiseModel, Start};
-use super::step_error;
+use super::step_error::StepError;
 use super::step_map::{Derivatives, StepMap};
 use super::walk::Walk;
 
@@ -70,9 +69,9 @@ pub struct Context<'a> {
     /// Whether the state derivatives of one physics step represent the row, in the model without
     /// further effects.
     pub one_step: bool,
-    /// The machine at half its time step, from which models have the engine's own error over the
-    /// rows; `None` before the first trajectory, and for an engine that takes no other time step.
-    pub finer: Option<Finer>,
+    /// The engine's own error over the rows; empty before the first trajectory, and for an engine
+    /// that takes no other time step.
+    pub step_error: StepError,
 }
 
 /// Rows, initial states and states that a context begins from.
@@ -104,13 +103,6 @@ impl Context<'_> {
         self.walks.iter().any(|w| w.segment.is_some())
     }
 
-    /// Center of the prior of the engine's own error, in standard deviations: one for its column,
-    /// or none if no model has one.
-    #[must_use]
-    pub fn step_error_center(&self) -> &'static [f64] {
-        &[step_error::CENTER][..usize::from(self.finer.is_some())]
-    }
-
     /// Returns the context restricted to some of the walks.
     #[must_use]
     pub fn of_walks(&self, which: &[usize]) -> Context<'_> {
@@ -129,7 +121,7 @@ impl Context<'_> {
             inertial: self.inertial.clone(),
             islands: self.islands.clone(),
             one_step: self.one_step,
-            finer: self.finer.as_ref().map(|f| f.of_walks(which)),
+            step_error: self.step_error.of_walks(which),
         }
     }
 
@@ -309,7 +301,7 @@ pub fn begin<'a>(
         islands: Islands::one(nv, logs.entries.len()),
         walks: taken.walks,
         one_step: false,
-        finer: None,
+        step_error: StepError::default(),
     };
     let ways = both_ways(&context, (&[], parameters), (theta, &trajectory))?;
     context.one_step = ways.one_step_tells(&context.scale);

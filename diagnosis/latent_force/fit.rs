@@ -7,6 +7,7 @@
 mod course;
 mod extent;
 mod kept_columns;
+mod own_steps;
 mod regression;
 mod secant;
 mod slopes;
@@ -20,12 +21,12 @@ use nalgebra::DMatrix;
 use super::context::Context;
 use super::estimate::Estimate;
 use super::fitted_value::Unknown;
-use super::half_step::HalfStep;
 use super::scales::settled;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
 use course::Course;
 pub use extent::Extent;
+pub use own_steps::OwnSteps;
 use regression::{Compared, compare, in_units, prior_of, shift, variations};
 pub use regression::{SCALES, regression, regression_at};
 pub use slopes::Slopes;
@@ -128,7 +129,6 @@ pub fn fit<'p>(
     let m = free.len();
     let nx = 2 * context.plant().layout.nv;
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + m + 1)?;
-    let mut finer = HalfStep::of(context, hypothesis)?;
     let steps = context.start_steps();
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
@@ -145,9 +145,7 @@ pub fn fit<'p>(
             &estimate,
             &variations,
         )?;
-        if let Some(finer) = &mut finer {
-            finer.error(&theta)?.join(&mut linear, m);
-        }
+        context.step_error.join(&mut linear, m);
         let model = (&unknowns[..], &free[..], &theta[..]);
         let whole = round == 0 || has_segments;
         if round == 0 && extent.settles {

@@ -24,10 +24,10 @@ use crate::work::Work;
 use super::context::Context;
 use super::fit::{Fitted, Hypothesis, fit};
 use super::fitted_value::Unknown;
-use super::half_step::Finer;
+use super::half_step::step_error;
 use super::left::left;
 use super::picture::forces;
-use super::search::{OpenLoop, Outcome, Set, search};
+use super::search::{OpenLoop, Outcome, Set, search, with_own_steps};
 use super::segments::firsts;
 use super::selection::gather;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
@@ -173,7 +173,10 @@ fn searched_in(
         is_gap: replays.leaves_a_gap(&none)?,
     };
     let how = (open_loop, progress);
-    let outcome = search(context, &none, offered, settings.breadth, how)?;
+    let mut outcome = search(context, &none, offered, settings.breadth, how)?;
+    if let Ok(finer) = bench.machine.halved() {
+        with_own_steps(context, &candidates, &finer, &mut outcome, progress)?;
+    }
     let drawn = (
         forces(context, &outcome, &candidates)?,
         left(context, &outcome),
@@ -202,9 +205,11 @@ fn searched_in(
 fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
     let (context, none) = (&mut stands.context, &mut stands.none);
     let (bench, hypothesis) = (null.bench, null.hypothesis);
-    if context.walks.iter().any(|w| w.segment.is_none()) {
-        let trajectory = &none.estimate.trajectory;
-        context.finer = Finer::of(&bench.machine, &context.walks, trajectory);
+    if context.walks.iter().any(|w| w.segment.is_none())
+        && let Ok(finer) = bench.machine.halved()
+    {
+        let (model, states) = ((hypothesis, &none.theta[..]), &none.estimate.trajectory);
+        context.step_error = step_error(context, model, states, &finer)?;
     }
     let shares = none.estimate.missing(context).share < 1.0;
     if shares {
@@ -212,7 +217,7 @@ fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
         none.estimate.free_at_start(context);
         none.estimate.set_resolution(context);
     }
-    if shares || context.finer.is_some() {
+    if shares || context.step_error.columns() > 0 {
         let from = (&none.estimate, &none.slopes);
         let rounds = (ROUNDS, null.progress);
         return fit(context, hypothesis, &none.theta, from, rounds);

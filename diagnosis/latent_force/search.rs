@@ -17,6 +17,7 @@ mod line_fit;
 mod measure;
 mod names;
 mod open_loop;
+mod own_steps;
 mod path;
 mod prior;
 mod prune;
@@ -41,6 +42,7 @@ use super::fit::Fitted;
 
 pub use names::Names;
 pub use open_loop::OpenLoop;
+pub use own_steps::with_own_steps;
 pub use prior::log_prior;
 pub use round::{Round, Seen};
 pub use screening::Sight;

@@ -5,10 +5,9 @@
 //! machine does not have. The form of the error is known: it is the change at half the time step,
 //! times two for a method of first order (Richardson 1911). Its size is less certain, since methods
 //! have other orders. So every model, with effects or without, has this column with a coefficient
-//! of its own: the step's error earns no name any evidence. Each model has the column of its own
-//! steps. An engine may step a joint's damping implicitly and a drive's explicitly; these then
-//! differ by the error of a step alone, which no log of a machine shows. Segments have the error as
-//! [directions](super::scatter).
+//! of its own: the step's error earns no name any evidence. Segments have it as
+//! [directions](super::scatter). The column is that of the model without effects; rivals are
+//! compared at the end with [that of each](super::fit::OwnSteps).
 
 use crate::checks::RICHARDSON;
 
@@ -22,19 +21,16 @@ const MEAN: f64 = 0.75;
 /// Prior standard deviation of the coefficient: both ends are one away.
 pub const DEVIATION: f64 = 0.25;
 
-/// Center of the coefficient's prior relative to an engine without error, in standard deviations.
-pub const CENTER: f64 = MEAN / DEVIATION;
-
 /// The error of each walk for a coefficient of one standard deviation.
 ///
 /// `(rows - 1) x nx` in tangent coordinates of the next state; empty for segments.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct StepError {
     walks: Vec<Vec<f64>>,
 }
 
 impl StepError {
-    /// Computes the error of walks that were linearised about one trajectory, at a time step and at
+    /// Computes the error of walks that were linearised about one trajectory at a time step and at
     /// half of it.
     ///
     /// `segments` has one flag a walk; a segment has no error.
@@ -54,6 +50,44 @@ impl StepError {
         let each = here.iter().zip(finer).zip(segments);
         Self {
             walks: each.map(of_walk).collect(),
+        }
+    }
+
+    /// Returns the error of some of the walks.
+    #[must_use]
+    pub fn of_walks(&self, which: &[usize]) -> Self {
+        Self {
+            walks: which
+                .iter()
+                .filter_map(|&w| self.walks.get(w))
+                .cloned()
+                .collect(),
+        }
+    }
+
+    /// Number of its columns: one, or none if the error is unknown.
+    #[must_use]
+    pub fn columns(&self) -> usize {
+        usize::from(!self.walks.is_empty())
+    }
+
+    /// Center of the prior relative to an engine without error, in standard deviations; one a
+    /// column.
+    #[must_use]
+    pub fn center(&self) -> &'static [f64] {
+        &[MEAN / DEVIATION][..self.columns()]
+    }
+
+    /// Returns this error with what changes from one error to another.
+    #[must_use]
+    pub fn with_change(&self, from: &Self, to: &Self) -> Self {
+        let of_walk = |((own, from), to): ((&Vec<f64>, &Vec<f64>), &Vec<f64>)| {
+            let each = own.iter().zip(from).zip(to);
+            each.map(|((own, from), to)| own + to - from).collect()
+        };
+        let walks = self.walks.iter().zip(&from.walks).zip(&to.walks);
+        Self {
+            walks: walks.map(of_walk).collect(),
         }
     }
 

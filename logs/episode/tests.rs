@@ -292,7 +292,10 @@ fn bad_logs_name_row_and_column() {
         ("time,angle\n0,1\n", "`ctrl.servo`"),
         ("time,ctrl.servo,angel\n0,1,2\n1,1,2\n", "`angel`"),
         ("time,ctrl.servo,tip.0,tip.1\n0,1,2,3\n", "`tip.2`"),
-        ("time,ctrl.servo,angle\n0,1,2\n0,1,2\n", "different times: 1"),
+        (
+            "time,ctrl.servo,angle\n0,1,2\n0,1,2\n",
+            "different times: 1",
+        ),
         (
             "time,ctrl.servo,angle\n0,1,2\n1,1,abc\n",
             "row 3, column `angle`: `abc`",

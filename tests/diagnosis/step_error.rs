@@ -7,7 +7,7 @@ use asid::core::{Episode, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
 use asid::diagnosis::latent_force::fit::Hypothesis;
-use asid::diagnosis::latent_force::half_step::{Finer, HalfStep};
+use asid::diagnosis::latent_force::half_step::step_error;
 use asid::diagnosis::latent_force::initial::from_readings;
 use asid::diagnosis::latent_force::step_error::DEVIATION;
 use asid::diagnosis::latent_force::step_map::{Derivatives, StepMap};
@@ -83,14 +83,12 @@ fn it_is_what_separates_a_row_of_steps_from_the_solution() {
         states: from_readings(&machine.plant, &logs, &walks, &[vec![0.0; 2 * rows]]),
         scale: vec![0.1, 0.3],
     };
-    let (mut context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
-    assert!(context.step_error_center().is_empty());
-    context.finer = Finer::of(&machine, &walks, &trajectory);
-    assert_eq!(context.step_error_center(), [3.0]);
-    let mut finer = HalfStep::of(&context, &Hypothesis::default())
-        .unwrap()
-        .unwrap();
-    finer.error(&[]).unwrap().join(&mut linear, 0);
+    let (context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
+    let model = Hypothesis::default();
+    let finer = machine.halved().unwrap();
+    let error = step_error(&context, (&model, &[]), &trajectory, &finer).unwrap();
+    assert_eq!((error.columns(), error.center()), (1, &[3.0][..]));
+    error.join(&mut linear, 0);
     let (mut left, mut whole) = (0.0, 0.0);
     for k in 0..rows - 1 {
         let [next, ahead] = [solution(SLIDE, state(k), ROW), state(k + 1)];

@@ -2,8 +2,8 @@
 //! take a candidate.
 
 use crate::candidate::Candidate;
-use crate::latent_force::context::Context;
 use crate::latent_force::fit::Hypothesis;
+use crate::latent_force::step_error::StepError;
 use crate::latent_force::step_map::Variation;
 
 use super::form::Form;
@@ -78,10 +78,9 @@ impl Asked {
     }
 
     /// Adds the engine's own error to the columns of the present model.
-    pub(super) fn add_step_error(&mut self, context: &Context<'_>) {
-        let center = context.step_error_center();
-        self.base += center.len();
-        self.center.extend(center);
+    pub(super) fn add_step_error(&mut self, error: &StepError) {
+        self.base += error.columns();
+        self.center.extend(error.center());
         self.bounds
             .resize(self.base, [f64::NEG_INFINITY, f64::INFINITY]);
     }

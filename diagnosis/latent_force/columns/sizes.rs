@@ -8,6 +8,7 @@ use super::force_response::ForceSlopes;
 use super::source::{Along, Source, Wanted};
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
+use crate::latent_force::step_error::StepError;
 use crate::latent_force::step_map::LinearEpisode;
 
 /// Step that first measures what a parameter does, relative to its range.
@@ -88,7 +89,7 @@ fn parts<'c>(
         inertial: context.inertial.clone(),
         islands: context.islands.clone(),
         one_step: context.one_step,
-        finer: None,
+        step_error: StepError::default(),
         walks,
     };
     Parts {

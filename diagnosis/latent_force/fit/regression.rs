@@ -95,8 +95,7 @@ pub(super) fn prior_of(
     context: &Context<'_>,
     (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
 ) -> (Vec<f64>, Vec<[f64; 2]>) {
-    let error = context.step_error_center();
-    let m = free.len() + error.len();
+    let m = free.len() + context.step_error.columns();
     let center = free.iter().map(|&i| -unknowns[i].distance(theta[i]));
     let mut center: Vec<f64> = center.collect();
     let bounds = free.iter().map(|&i| {
@@ -104,7 +103,7 @@ pub(super) fn prior_of(
         u.bounds.map(|b| (b - theta[i]) / u.deviation)
     });
     let mut bounds: Vec<[f64; 2]> = bounds.collect();
-    center.extend(error);
+    center.extend(context.step_error.center());
     bounds.resize(m, [f64::NEG_INFINITY, f64::INFINITY]);
     (center, bounds)
 }
