@@ -181,7 +181,7 @@ mod tests {
     fn a_wider_search_that_is_lost_is_told_from_one_that_is_less_lucky() {
         // 40 simulations, whose luck shifts all 200 readings together by 2 noises.
         let (count, readings) = (40, 200);
-        let shift = |i: usize| if i % 2 == 0 { 2.0 } else { -2.0 };
+        let shift = |i: usize| if i.is_multiple_of(2) { 2.0 } else { -2.0 };
         let roughness = DMatrix::from_fn(count, readings, |i, _| shift(i));
         let left = |residual: &dyn Fn(usize) -> f64| Evidence {
             residual: (0..readings).map(residual).collect(),

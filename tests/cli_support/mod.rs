@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Engine of the quick runs. With an arm of seven joints MuJoCo is four times as fast as rapier.
+#[allow(dead_code)] // Not every test names it.
 pub const ENGINE: &str = if cfg!(feature = "mujoco") {
     "mujoco"
 } else {

@@ -162,7 +162,7 @@ fn on_chance_alone_small_p_values_are_as_rare_as_they_say() {
     let root = (&chance.white + &chance.force).cholesky().unwrap().l();
     let mut random = Streams::new(7).stream("logs");
     let trials = 400;
-    let mut p_value = |trial: u64| {
+    let p_value = |trial: u64| {
         let normal = |_, _| random.sample::<f64, _>(StandardNormal);
         let y = &root * DVector::from_fn(12, normal);
         let scales = chance.screened(&y);
@@ -171,7 +171,7 @@ fn on_chance_alone_small_p_values_are_as_rare_as_they_say() {
         let found = gains.fold(f64::NEG_INFINITY, f64::max);
         rehearse(&scales, (&columns, &[0.0; 6]), (&[], found), trial).p_value
     };
-    let all: Vec<f64> = (0..trials).map(|t| p_value(t)).collect();
+    let all: Vec<f64> = (0..trials).map(p_value).collect();
     for level in [0.05, 0.1, 0.3] {
         let share = all.iter().filter(|p| **p <= level).count() as f64 / trials as f64;
         let error = (level * (1.0 - level) / trials as f64).sqrt();

@@ -128,6 +128,6 @@ mod tests {
         let found = tables_of(&[whole.clone(), path("c.csv")]);
         assert_eq!(found, [path("a.csv"), path("b.csv"), path("c.csv")]);
         std::fs::write(path("metadata.yaml"), "").unwrap();
-        assert_eq!(tables_of(&[whole.clone()]), [whole]);
+        assert_eq!(tables_of(std::slice::from_ref(&whole)), [whole]);
     }
 }
