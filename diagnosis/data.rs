@@ -1,12 +1,15 @@
 //! Logs prepared for comparison: entries, noise, and which readings count.
 
 mod cut;
+mod row_time;
 
 use asid_core::layout::reads_forces;
 use asid_core::signal::Signal;
 use asid_core::{Episode, Result};
 use asid_readings::SignalSet;
 use asid_readings::replay::ReplayPlan;
+
+pub use row_time::row_time;
 
 /// One compared number of a row: a component of a sensor's reading, or of a rotation vector.
 #[derive(Clone, Debug, PartialEq)]

@@ -260,16 +260,19 @@ fn bad_logs_name_row_and_column() {
     // A column that the model does not know is ignored.
     identify(
         &format!("{header},rod_spin\n{},1\n", row("0", "0.5")),
-        &["1 rows"],
+        &["rows of data at different times: 1,"],
     );
-    identify(&format!("{header}\n{}\n", row("0", "0.5")), &["1 rows"]);
+    identify(
+        &format!("{header}\n{}\n", row("0", "0.5")),
+        &["different times: 1,"],
+    );
     identify(
         &format!("{header}\n{}\n{}\n", row("0", "0.5"), row("0.02", "abc")),
         &["row 3", "`rod_pos.0`", "`abc`"],
     );
     identify(
         &format!("{header}\n{}\n{}\n", row("0.1", "0.5"), row("0.1", "0.5")),
-        &["1 rows", "different times"],
+        &["different times: 1,"],
     );
     identify(
         &format!(
@@ -427,7 +430,7 @@ fn a_custom_world_with_nothing_of_its_own_is_refused() {
 }
 
 #[test]
-fn a_true_value_that_no_engine_takes_is_named_by_its_option() {
+fn a_true_value_that_no_engine_takes_is_named() {
     let place = Workplace::new();
     let output = place.run(&tiny(&[
         "run",
@@ -446,7 +449,7 @@ fn a_true_value_that_no_engine_takes_is_named_by_its_option() {
         said.lines()
             .last()
             .unwrap()
-            .contains("--truth mass: must not be negative, as -1 is"),
+            .contains("parameter `mass`: the real world cannot have its true value of -1"),
         "{said}"
     );
 }

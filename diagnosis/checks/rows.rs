@@ -1,8 +1,7 @@
 //! Rows: whether they are close enough to show a motion.
 
 use super::check;
-use crate::data::Logs;
-use crate::latent_force::budget::row_time;
+use crate::data::{Logs, row_time};
 use crate::result::CheckResult;
 
 /// Time between two rows from which on they hardly show how a machine moves, s.

@@ -7,7 +7,7 @@
 
 use asid_core::{Episode, Error, Layout, Result};
 
-use crate::noise::median;
+use crate::data::row_time;
 
 use super::walk::Walk;
 
@@ -25,9 +25,12 @@ const SQUARE_BUDGET: f64 = 432_000.0;
 const FEWEST: usize = 150;
 /// Most physics steps of these rows: 40 a row, as of a log at 50 Hz with a time step of 0.5 ms.
 const FEWEST_STEPS: usize = 6000;
-/// Fewest rows of a log, where it has them, that are worth a diagnosis: a first speed takes six of
-/// them, and a joint that moves and returns as many each way.
-const USABLE: usize = 20;
+/// Fewest rows of a log, where it has them, that are worth a diagnosis: a first speed takes six.
+const USABLE: usize = 6;
+/// Fewest rows of all logs, where they have them, that are worth a diagnosis: with a reading in
+/// each, three for each number of the least of models (two coordinates of a start, the force's
+/// variances and an effect) are 18.
+const USABLE_IN_ALL: usize = 20;
 
 /// Physics steps of one walk along all logs that the budget holds, for a machine with `nv` degrees
 /// of freedom.
@@ -64,41 +67,43 @@ pub fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     walks.iter().map(part).collect()
 }
 
-/// Refuses logs of whose rows the budget holds fewer than `USABLE`.
+/// Refuses logs of whose rows the budget holds too few to tell anything.
 ///
 /// # Errors
-/// When there is one; the message names it and says how far its rows are apart.
+/// When it does; the message names a log and says how far its rows are apart.
 pub fn check_rows(layout: &Layout, logs: &[(String, Episode)]) -> Result<()> {
     let timestep = layout.timestep;
-    let seconds = |e: &Episode| e.time[e.rows() - 1] - e.time[0];
-    let steps: f64 = logs.iter().map(|(_, e)| seconds(e) / timestep).sum();
-    let share = affordable(layout.nv) / steps.max(1.0);
-    for (name, episode) in logs {
-        let substeps: Vec<usize> = (episode.time.windows(2))
-            .map(|t| ((t[1] - t[0]) / timestep).round() as usize)
-            .collect();
-        let used = rows(&substeps, share.min(1.0));
-        if used < USABLE.min(episode.rows()) {
-            let apart = row_time(episode);
-            return Err(Error::Log {
-                path: name.into(),
-                message: format!(
-                    "its rows are {apart:.3} s apart, {:.0} time steps of the model each, and a diagnosis has time for {used} of them, fewer than \
-                     {USABLE}: is its time in ms? `[[column]] name = \"time\"` with `unit = \"ms\"` says so; for a machine that is this slow give \
-                     the model a longer time step",
-                    apart / timestep
-                ),
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Median time between two rows of a log, s.
-#[must_use]
-pub fn row_time(episode: &Episode) -> f64 {
-    let mut each: Vec<f64> = episode.time.windows(2).map(|t| t[1] - t[0]).collect();
-    median(&mut each).unwrap_or(0.0)
+    let substeps = |(_, e): &(String, Episode)| -> Vec<usize> {
+        let apart = e.time.windows(2).map(|t| (t[1] - t[0]) / timestep);
+        apart.map(|n| n.round() as usize).collect()
+    };
+    let each: Vec<Vec<usize>> = logs.iter().map(substeps).collect();
+    let steps: usize = each.iter().flatten().sum();
+    let share = (affordable(layout.nv) / steps.max(1) as f64).min(1.0);
+    let used: Vec<usize> = each.iter().map(|n| rows(n, share)).collect();
+    let all: usize = each.iter().map(|n| n.len() + 1).sum();
+    let in_all: usize = used.iter().sum();
+    let too_few = in_all < USABLE_IN_ALL.min(all);
+    let short =
+        |((_, e), used): (&(String, Episode), &usize)| too_few || *used < USABLE.min(e.rows());
+    let Some((name, episode)) = logs
+        .iter()
+        .zip(&used)
+        .find(|one| short(*one))
+        .map(|one| one.0)
+    else {
+        return Ok(());
+    };
+    let apart = row_time(episode);
+    Err(Error::Log {
+        path: name.into(),
+        message: format!(
+            "its rows are {apart:.3} s apart, {:.0} time steps of the model each, and a diagnosis has time for {in_all} rows of all logs, too \
+             few to tell anything: is its time in ms? `[[column]] name = \"time\"` with `unit = \"ms\"` says so; for a machine that is this \
+             slow give the model a longer time step",
+            apart / timestep
+        ),
+    })
 }
 
 #[cfg(test)]
@@ -165,8 +170,9 @@ mod tests {
         );
         assert!(said.contains("is its time in ms?"), "{said}");
         assert_eq!(said.lines().count(), 1);
-        // A slow machine, read every two seconds, and a log of few rows.
-        assert!(check_rows(&layout, &[log(200, 2.0)]).is_ok());
+        // A slow machine, read every second in seven logs, and a log of few rows.
+        let slow: Vec<(String, Episode)> = (0..7).map(|_| log(400, 1.0)).collect();
+        assert!(check_rows(&layout, &slow).is_ok());
         assert!(check_rows(&layout, &[log(3, 0.01)]).is_ok());
         assert!((row_time(&wrong[0].1) - 10.0).abs() < 1e-12);
     }

@@ -265,7 +265,7 @@ fn wrong_calls_are_one_line_and_write_nothing() {
         ),
         (
             &["--topic", "/joint_states"],
-            "no column is the command of the actuators `pan`, `gripper`",
+            "no column is the command of the actuators `pan` and `gripper`",
         ),
         (&["--topic", "/nothing"], "no messages of topic `/nothing`"),
         (

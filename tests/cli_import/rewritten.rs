@@ -212,7 +212,7 @@ fn all_missing_commands_are_named_at_once() {
     let done = import(&logs, &folder.path().join("study"), &[]);
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     assert!(
-        said.contains("the command of the actuators `pan`, `gripper`"),
+        said.contains("the command of the actuators `pan` and `gripper`"),
         "{said}"
     );
 }
