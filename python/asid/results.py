@@ -406,7 +406,7 @@ class Gap(Record):
     closed: float | None
     """Share of the excess squared gap that they close, negative where they widen it; null where there is none."""
     closed_interval95: Array | None
-    """95 % interval of it, by a bootstrap over episodes."""
+    """95 % interval of it, by a bootstrap over episodes; null where fewer than three are held out."""
     identified: float
     """After fitting the study's own parameters."""
     noise_floor: float
