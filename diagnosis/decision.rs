@@ -51,10 +51,11 @@ pub fn is_in_training_alone(none: Replayed) -> bool {
 }
 
 /// Whether replays of the held-out logs with a set are closer to the readings than those without
-/// it, and than the readings' own mean ([`crate::skill`]).
+/// it, and than the readings' own mean ([`crate::skill`]) unless they leave no gap.
 ///
-/// A set without such skill explains nothing. If the held-out logs have no gap, the set must leave
-/// none there and close that of the training logs.
+/// A set without such skill explains nothing. One that leaves no gap predicts all that the readings
+/// show: where a machine stands still, their mean can be no worse. If the held-out logs have no
+/// gap, the set must leave none there and close that of the training logs.
 fn has_skill(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
     if is_in_training_alone(evidence.none) {
         let left = |mean_square: f64| mean_square - 1.0;
@@ -62,7 +63,8 @@ fn has_skill(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
         return set.held_out <= LEAST_GAP * LEAST_GAP && left(set.train) < most;
     }
     let worse_than = |other: f64| set.held_out >= other;
-    !worse_than(evidence.none.held_out) && !worse_than(evidence.mean.held_out)
+    let is_left = set.held_out > LEAST_GAP * LEAST_GAP;
+    !worse_than(evidence.none.held_out) && !(is_left && worse_than(evidence.mean.held_out))
 }
 
 /// Returns the mean square of the engine's own error; 0 if it is unknown, since the larger of 0 and

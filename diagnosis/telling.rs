@@ -251,7 +251,8 @@ impl Telling<'_> {
             checks::data(&bench.train.logs, &bench.test.logs, bench.open.len()),
             checks::units(bench, self.nominal)?,
         ];
-        all.extend(checks::motion(&bench.train.logs));
+        let left = none.fit.cost / bench.train.readings.max(1) as f64;
+        all.extend(checks::motion(&bench.train.logs, left.sqrt()));
         all.extend(checks::rows(&bench.train.logs, &bench.test.logs));
         all.extend(checks::memory(&bench.machine));
         all.extend(checks::identifiability(&bench.parameters, none, best));

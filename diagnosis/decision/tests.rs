@@ -225,6 +225,15 @@ fn what_predicts_the_logs_held_out_no_better_than_their_mean_or_no_effect_is_not
     );
 }
 
+/// Symptom: a lift that three frictions held at rest was answered with `unknown`. Cause: the mean of
+/// readings at rest leaves their noise alone, which no replay undercuts.
+#[test]
+fn what_holds_a_machine_at_rest_is_named() {
+    let mut e = evidence(80.0, vec![tried(&["a"], 1, 300.0, 1.03)], 0.01);
+    e.mean = replayed(0.99, 1.01);
+    assert!(!decided(&e).is_unknown);
+}
+
 #[test]
 fn what_the_logs_show_without_a_search_stands_beside_no_effect() {
     let steps = tried(&["sensor-quantization@q"], 1, 800.0, 1.0);
