@@ -63,8 +63,8 @@ fn has_skill(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
         return set.held_out <= LEAST_GAP * LEAST_GAP && left(set.train) < most;
     }
     let worse_than = |other: f64| set.held_out >= other;
-    let is_left = set.held_out > LEAST_GAP * LEAST_GAP;
-    !worse_than(evidence.none.held_out) && !(is_left && worse_than(evidence.mean.held_out))
+    let leaves_no_gap = set.held_out <= LEAST_GAP * LEAST_GAP;
+    !worse_than(evidence.none.held_out) && (leaves_no_gap || !worse_than(evidence.mean.held_out))
 }
 
 /// Returns the mean square of the engine's own error; 0 if it is unknown, since the larger of 0 and
